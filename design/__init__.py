@@ -1,0 +1,1 @@
+"""The control: gains over the whole grid at once, and everything that judges them."""

@@ -1,0 +1,210 @@
+"""Many candidate gains judged at once, in the normal form: fast and close, not exact.
+
+The figures steer the search; the gains that it chooses are judged again, exactly and on the loop in state space,
+before they leave the product. Costs are kept down by judging in stages: poles first, then the frequency response of
+those that are damped enough, then the step of those whose margins are near enough.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.normal_form import NormalForm
+from design.specs import Spec
+from model.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+
+#: A candidate that misses a spec by more than this part of it is not judged any further.
+NEAR = 0.5
+FREQUENCIES = 220
+TIMES = 320
+#: Oscillatory modes whose damping is followed, least damped first.
+MODES = 3
+#: How many candidates are expanded over frequency or time at once; bounds the memory.
+CHUNK = 2048
+#: Decibels of a margin that does not exist, so that comparisons stay finite.
+NO_LIMIT_DB = 200.0
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Figures of K candidates; nan where not judged.
+
+    Attributes
+    ----------
+    values : (K,) by quantity, in the units of `design.specs.QUANTITIES`
+    bandwidth : (K,) of r_a -> da, where |T| first falls below -3 dB [rad/s]
+    """
+
+    values: dict[str, FloatArray]
+    bandwidth: FloatArray
+
+    def miss(self, spec: Spec) -> FloatArray:
+        """How far each candidate misses a spec, as a part of the limit; <= 0 is met, inf where not judged."""
+        scale = abs(spec.limit) if spec.limit else 1.0
+        miss = -spec.distance(self.values[spec.quantity]) / scale
+        return np.where(np.isnan(miss), np.inf, miss)
+
+    def where(self, keep: BoolArray, other: Judged) -> Judged:
+        """These figures where `keep`, those of `other` elsewhere."""
+        values = {name: np.where(keep, v, other.values[name]) for name, v in self.values.items()}
+        return Judged(values, np.where(keep, self.bandwidth, other.bandwidth))
+
+
+class CandidateJudge:
+    """Judges candidates of a normal form over a flat grid of P points.
+
+    Parameters
+    ----------
+    form : normal form, G = (P,)
+    horizon : how long step responses are followed [s]
+    """
+
+    def __init__(self, form: NormalForm, horizon: float) -> None:
+        self.form = form
+        self.horizon = horizon * form.frequency  # in units of 1 / omega_n
+        top = 30.0 * np.maximum(form.servo_ratio, 1.0)
+        self.x = np.exp(np.linspace(np.log(0.01), np.log(top), FREQUENCIES, axis=-1))  # (P, W)
+        powers = (1j * self.x)[..., None] ** np.arange(form.denominator.shape[-1] - 1, -1, -1)
+        d = np.einsum("pwk,pk->pw", powers, form.denominator)
+        self.terms: ComplexArray = np.einsum("pwk,pjk->pjw", powers, form.numerators) / d[:, None, :]
+
+    def judge(self, at: IntArray, kappa: FloatArray, specs: tuple[Spec, ...]) -> Judged:
+        """Judge candidates `kappa` (K, J), each at its own point `at` (K,).
+
+        `specs` decide only which candidates are worth judging further.
+        """
+        names = ("damping_ratio", "gain_margin", "phase_margin", "settling_time", "overshoot")
+        values = {name: np.full(at.shape, np.nan) for name in names}
+        judged = Judged(values, np.full(at.shape, np.nan))
+        for start in range(0, at.size, CHUNK):
+            part = slice(start, start + CHUNK)
+            self._judge_part(judged, np.arange(at.size)[part], at[part], kappa[part], specs)
+        return judged
+
+    def mode_damping(self, at: IntArray, kappa: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Damping ratio of the least damped modes (K, MODES) and its exact gradient in the gains (K, MODES, J).
+
+        A pole moves by ``ds/dkappa_j = -n_j(s) / p'(s)``. Real poles have a ratio of 1 or -1 and do not change it.
+        """
+        polynomial = self.form.denominator[at] + np.einsum("kj,kjn->kn", kappa, self.form.numerators[at])
+        roots = _roots(polynomial)
+        n = polynomial.shape[-1]
+        powers = roots[..., None] ** np.arange(n - 1, -1, -1)
+        slope = np.einsum("kn,krn->kr", polynomial[:, :-1] * np.arange(n - 1, 0, -1), powers[..., 1:])
+        moved = -np.einsum("kjn,krn->krj", self.form.numerators[at], powers)
+        moved = moved / np.where(slope == 0, np.inf, slope)[..., None]
+        size = np.maximum(np.abs(roots), 1e-300)
+        ratio = -roots.real / size
+        along = np.real(np.conj(roots)[..., None] * moved)
+        gradient = -moved.real / size[..., None] + roots.real[..., None] * along / size[..., None] ** 3
+        least = np.argsort(np.where(roots.imag > 0, ratio, 2.0), axis=-1)[:, :MODES]
+        chosen = np.take_along_axis(np.where(roots.imag > 0, ratio, 2.0), least, axis=-1)
+        gradient = np.where((roots.imag > 0)[..., None], gradient, 0.0)
+        return chosen, np.take_along_axis(gradient, least[..., None], axis=1)
+
+    def _judge_part(
+        self, judged: Judged, rows: IntArray, at: IntArray, kappa: FloatArray, specs: tuple[Spec, ...]
+    ) -> None:
+        values = judged.values
+        polynomial = self.form.denominator[at] + np.einsum("kj,kjn->kn", kappa, self.form.numerators[at])
+        roots = _roots(polynomial)
+        values["damping_ratio"][rows] = np.min(-roots.real / np.maximum(np.abs(roots), 1e-300), axis=-1)
+        keep = np.max(roots.real, axis=-1) < 0
+        keep &= _near(judged, rows, specs, ("damping_ratio",))
+        rows, at, kappa, polynomial, roots = rows[keep], at[keep], kappa[keep], polynomial[keep], roots[keep]
+        L = np.einsum("kj,kjw->kw", kappa, self.terms[at])
+        values["gain_margin"][rows] = _gain_margin_db(L)
+        values["phase_margin"][rows] = _phase_margin(L)
+        judged.bandwidth[rows] = self._bandwidth(at, kappa, L)
+        keep = _near(judged, rows, specs, ("gain_margin", "phase_margin"))
+        if not {"settling_time", "overshoot"} & {s.quantity for s in specs}:
+            return
+        rows, at, kappa, polynomial, roots = rows[keep], at[keep], kappa[keep], polynomial[keep], roots[keep]
+        values["overshoot"][rows], values["settling_time"][rows] = self._step(at, kappa, polynomial, roots)
+
+    def _bandwidth(self, at: IntArray, kappa: FloatArray, L: ComplexArray) -> FloatArray:
+        """First frequency [rad/s] at which |T| falls below -3 dB."""
+        T = np.abs(kappa[:, -1:] * self.terms[at, -1, :] / (1.0 + L)) * np.sqrt(2.0)
+        below = T < 1.0
+        k = np.clip(np.argmax(below, axis=-1), 1, None)
+        row = np.arange(at.size)
+        part = np.log(T[row, k - 1]) / np.log(T[row, k - 1] / T[row, k])
+        low, high = self.x[at, k - 1], self.x[at, k]
+        omega = self.form.frequency[at] * low * (high / low) ** np.clip(part, 0.0, 1.0)
+        return np.where(below.any(axis=-1), omega, np.nan)
+
+    def _step(
+        self, at: IntArray, kappa: FloatArray, polynomial: FloatArray, roots: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Overshoot (part of the step) and 2 % settling time [s] from the partial fractions of T / s."""
+        n = polynomial.shape[-1]
+        powers = roots[..., None] ** np.arange(n - 1, -1, -1)
+        numerator = kappa[:, -1:] * self.form.numerators[at, -1, :]
+        slope = np.einsum("kn,krn->kr", polynomial[:, :-1] * np.arange(n - 1, 0, -1), powers[..., 1:])
+        slope *= roots
+        residues = np.einsum("kn,krn->kr", numerator, powers) / np.where(slope == 0, np.inf, slope)
+        dt = self.horizon[at] / TIMES
+        ratio = np.exp(roots * dt[:, None])
+        e = residues[..., None] * np.cumprod(np.broadcast_to(ratio[..., None], (*ratio.shape, TIMES)), axis=-1)
+        error = np.concatenate([np.full((at.size, 1), -1.0), e.sum(axis=1).real], axis=-1)  # y - 1
+        return _peak(error), _settling(error) * dt / self.form.frequency[at]
+
+
+def _near(judged: Judged, rows: IntArray, specs: tuple[Spec, ...], quantities: tuple[str, ...]) -> BoolArray:
+    near = np.ones(rows.size, dtype=bool)
+    for spec in specs:
+        if spec.quantity in quantities:
+            near &= judged.miss(spec)[rows] < NEAR
+    return near
+
+
+def _roots(polynomial: FloatArray) -> ComplexArray:
+    """Roots of polynomials (K, n + 1) with leading coefficient not zero, as eigenvalues of companions."""
+    n = polynomial.shape[-1] - 1
+    companion = np.zeros((*polynomial.shape[:-1], n, n))
+    companion[..., 0, :] = -polynomial[..., 1:] / polynomial[..., :1]
+    companion[..., np.arange(1, n), np.arange(n - 1)] = 1.0
+    return np.asarray(np.linalg.eigvals(companion), dtype=complex)
+
+
+def _gain_margin_db(L: ComplexArray) -> FloatArray:
+    """Smallest change of gain, up or down [dB], that puts the locus through -1: crossings of the negative axis."""
+    re, im = L.real, L.imag
+    crosses = im[:, 1:] * im[:, :-1] < 0
+    part = im[:, :-1] / np.where(crosses, im[:, :-1] - im[:, 1:], 1.0)
+    at = re[:, :-1] + part * (re[:, 1:] - re[:, :-1])
+    decibels = np.abs(20.0 * np.log10(np.where(crosses & (at < 0), -at, 1e-10)))
+    return np.asarray(np.min(np.where(crosses & (at < 0), decibels, NO_LIMIT_DB), axis=-1))
+
+
+def _phase_margin(L: ComplexArray) -> FloatArray:
+    """Smallest angle [rad] between -1 and the locus where |L| = 1."""
+    m = np.log(np.abs(L))
+    crosses = m[:, 1:] * m[:, :-1] < 0
+    part = m[:, :-1] / np.where(crosses, m[:, :-1] - m[:, 1:], 1.0)
+    at = L[:, :-1] + part * (L[:, 1:] - L[:, :-1])
+    return np.asarray(np.min(np.where(crosses, np.abs(np.angle(-at)), np.pi), axis=-1))
+
+
+def _peak(error: FloatArray) -> FloatArray:
+    """Largest value above the final one, by a parabola through the largest sample; at least 0."""
+    k = np.clip(np.argmax(error, axis=-1), 1, error.shape[-1] - 2)
+    row = np.arange(k.size)
+    left, mid, right = error[row, k - 1], error[row, k], error[row, k + 1]
+    bend = left - 2.0 * mid + right
+    lift = np.where(bend < 0, -((right - left) ** 2) / (8.0 * np.where(bend < 0, bend, -1.0)), 0.0)
+    return np.asarray(np.maximum(mid + lift, 0.0))
+
+
+def _settling(error: FloatArray, band: float = 0.02) -> FloatArray:
+    """Time, in samples, after which the error stays within the band; nan when it does not within the horizon."""
+    outside = np.abs(error) > band
+    last = error.shape[-1] - 1 - np.argmax(outside[:, ::-1], axis=-1)
+    settled = last < error.shape[-1] - 1
+    k = np.minimum(last, error.shape[-1] - 2)
+    row = np.arange(k.size)
+    a, b = np.abs(error[row, k]), np.abs(error[row, k + 1])
+    time = k + (a - band) / np.where(a > b, a - b, 1.0)
+    return np.where(settled & outside.any(axis=-1), time, np.where(settled, 0.0, np.nan))

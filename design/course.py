@@ -1,0 +1,84 @@
+"""The course of a step response from 0 (trim) to 1 (final value): its crossings and its peak, in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.interpolant import Extremes, crossings, local_maxima, windows
+from model.arrays import BoolArray, FloatArray, GridArrays, IntArray
+
+#: A sampled maximum lies above this part of the maximum it stands for, on samples that resolve the signal.
+SAMPLED_PART = 0.8
+#: A sample that stands out by less than this part of the largest is rounding.
+NOISE = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Peak(GridArrays):
+    """Largest value and the time [s] when it is reached, each (N,)."""
+
+    value: FloatArray
+    time: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Courses of N points on a graded mesh.
+
+    Attributes
+    ----------
+    fraction : (N, S, m+1) the change since trim, as a fraction of the final change
+    times : (S, m+1) sample times [s]
+    """
+
+    fraction: FloatArray
+    times: FloatArray
+
+    @property
+    def rows(self) -> FloatArray:
+        """(N S, m+1) the blocks, each a row of even samples."""
+        return self.fraction.reshape(-1, self.fraction.shape[-1])
+
+    @property
+    def flat(self) -> FloatArray:
+        """(N, S (m+1)) the samples in order of time."""
+        return self.fraction.reshape(len(self.fraction), self.times.size)
+
+    def first_time(self, level: float) -> FloatArray:
+        """(N,) time when the level is first reached [s]; nan where it is not."""
+        reached = self.flat >= level
+        index = np.argmax(reached, axis=-1)
+        return np.where(np.any(reached, axis=-1), self._crossing_time(index, np.full(len(index), level)), np.nan)
+
+    def settling_time(self, band: float) -> FloatArray:
+        """(N,) time after which the course stays within 1 +- band [s]; nan where it ends outside."""
+        error = np.abs(self.flat - 1.0)
+        outside = error > band
+        last = self.times.size - 1 - np.argmax(outside[:, ::-1], axis=-1)
+        ends_outside = outside[:, -1]
+        level = 1.0 + band * np.sign(np.take_along_axis(self.flat, last[:, None], axis=-1)[:, 0] - 1.0)
+        after = np.minimum(last + 1, self.times.size - 1)
+        settled = np.where(np.any(outside, axis=-1), self._crossing_time(after, level), 0.0)
+        settled = self._after_hidden_excursions(settled, band)
+        return np.where(ends_outside, np.nan, settled)
+
+    def peak(self) -> Peak:
+        """Largest value of each course and its time."""
+        flat = self.flat
+        index = np.argmax(flat, axis=-1)
+        value = np.take_along_axis(flat, index[:, None], axis=-1)[:, 0]
+        time = self.times.reshape(-1)[index]
+        found = self._maxima(self.fraction)
+        point, when = found.row // len(self.times), self._time(found.row, found.place)
+        for e in np.argsort(found.value, kind="stable"):
+            pass
+        return Peak(value, time)
+
+    def undershoot(self) -> FloatArray:
+        """(N,) largest excursion the wrong way, >= 0."""
+        found = self._maxima(-self.fraction)
+        largest = np.maximum(np.max(-self.flat, axis=-1), 0.0)
+        np.maximum.at(largest, found.row // len(self.times), found.value)
+        return largest

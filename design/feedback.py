@@ -1,0 +1,107 @@
+"""A loop closed at the gain it is flown with, and its response on the imaginary axis.
+
+Margins are read off the complementary sensitivity ``T = L / (1 + L) = c (sI - A + b c)^-1 b``, because it is
+finite on the whole axis as soon as the closed loop has no pole there, while L itself is not when the open
+loop has integrators. L is real where T is; the gain ratio that makes it -1 is ``-1/L = 1 - 1/T``; ``|L| = 1``
+where ``Re T = 1/2``; the sensitivity is ``1 - T``. A delay multiplies L by ``exp(-j w delay)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.loop import SisoLoop
+from design.polynomials import power_of_two_scale
+from design.transfer import Transfer, response, transfer
+from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoop(GridArrays):
+    """The grid's N points in one row, every frequency in units of the point's own `scale`.
+
+    Attributes
+    ----------
+    A, b, c : (N, n, n), (N, n), (N, n), closed loop and transfer ``T = c (sI - A)^-1 b``
+    transfer : the open loop L, (N, n+1) coefficients
+    poles : (N, n) of the closed loop, the delay left out
+    scale : (N,) [rad/s]
+    delay : (N,) transport delay times `scale`
+    regular : (N,) mask of the points without a closed-loop pole on the axis. The others are replaced by
+        ``L = 0``: they have no margins, and must not stop the rest
+    """
+
+    A: FloatArray
+    b: FloatArray
+    c: FloatArray
+    transfer: Transfer
+    poles: ComplexArray
+    scale: FloatArray
+    delay: FloatArray
+    regular: BoolArray
+
+    @property
+    def delayed(self) -> bool:
+        """Whether there is a delay at all; it is the same for the whole grid."""
+        return bool(np.any(self.delay > 0.0))
+
+    @property
+    def characteristic(self) -> FloatArray:
+        """Characteristic polynomial of the closed loop without delay (N, n+1)."""
+        return self.transfer.denominator + self.transfer.numerator
+
+
+def closed_loop(loop: SisoLoop) -> ClosedLoop:
+    """`loop` at the gain it is flown with, sign and gain drawn into b; `ClosedLoop` says how it is held."""
+    n = loop.A.shape[-1]
+    A, c = loop.A.reshape(-1, n, n), loop.c.reshape(-1, n)
+    b = loop.b.reshape(-1, n) * (loop.sign * loop.gain.reshape(-1))[:, None]
+    open_loop = transfer(A, b, c)
+    scale = power_of_two_scale(open_loop.denominator + open_loop.numerator)
+    closed = (A - b[:, :, None] * c[:, None, :]) / scale[:, None, None]
+    poles = np.linalg.eigvals(closed).astype(complex)
+    regular = np.abs(poles.real).min(axis=-1) > 1e-12 * np.abs(poles).max(axis=-1)
+    nothing = np.zeros(n + 1)
+    return ClosedLoop(
+        np.where(regular[:, None, None], closed, -np.eye(n)),
+        np.where(regular[:, None], b / scale[:, None], 0.0),
+        c,
+        Transfer(
+            np.where(regular[:, None], open_loop.scaled(scale).numerator, nothing),
+            np.where(regular[:, None], open_loop.scaled(scale).denominator, np.poly(-np.ones(n))),
+        ),
+        np.where(regular[:, None], poles, -1.0),
+        scale,
+        loop.delay * scale,
+        regular,
+    )
+
+
+def complementary(
+    loop: ClosedLoop, rows: IntArray, omega: FloatArray, delayed: bool
+) -> tuple[ComplexArray, ComplexArray]:
+    """T and dT/dw (K,) at the frequencies `omega` (K,) of the points `rows` (K,), from the matrices."""
+    at = response(loop.A[rows], loop.b[rows], loop.c[rows], 1j * omega[:, None])
+    value, slope = at.value[:, 0], 1j * at.slope[:, 0]
+    if not delayed:
+        return value, slope
+    delay = loop.delay[rows]
+    turn = np.exp(-1j * omega * delay)
+    top, bottom = turn * value, 1.0 + (turn - 1.0) * value
+    top_slope = turn * (slope - 1j * delay * value)
+    bottom_slope = (turn - 1.0) * slope - 1j * delay * top
+    return top / bottom, (top_slope * bottom - top * bottom_slope) / bottom**2
+
+
+def open_loop_value(T: ComplexArray) -> ComplexArray:
+    """``L = T / (1 - T)``; nan where T is, infinite where it is 1."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return T / (1.0 - T)
+
+
+def log_slope(T: ComplexArray, slope: ComplexArray) -> FloatArray:
+    """``d log|L| / dw`` from T and dT/dw; nan where they are."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (slope / (T * (1.0 - T))).real

@@ -1,0 +1,63 @@
+"""Linear programmes of a few unknowns, solved in batches by looking at every vertex.
+
+The optimum of a linear programme lies where as many constraints meet as there are unknowns. With two or three
+unknowns and a dozen constraints there are few such vertices, and a batch of them is one stacked solve.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from model.arrays import FloatArray
+
+
+def best_vertex(
+    slope: FloatArray, value: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Step that raises a linear aim most while all linear constraints hold, or comes nearest to holding them.
+
+    Maximise ``slope . d`` subject to ``value + gradient d <= 0`` and ``low <= d <= high``.
+
+    Parameters
+    ----------
+    slope : (K, J) gradient of the aim
+    value : (K, M) constraints at d = 0, at most 0 when met
+    gradient : (K, M, J) their gradients
+    low, high : (K, J) box, ``low <= 0 <= high``
+
+    Returns
+    -------
+    (K, J) the best vertex: among those that meet all constraints the one with the largest aim; when none does,
+    the one whose largest violation is least.
+    """
+    k, j = slope.shape
+    eye = np.broadcast_to(np.eye(j), (k, j, j))
+    normals = np.concatenate([gradient, eye, -eye], axis=1)
+    bounds = np.concatenate([-value, high, -low], axis=1)  # normals . d <= bounds
+    triples = np.array([c for c in combinations(range(normals.shape[1]), j) if not _opposite(c, value.shape[1], j)])
+    N, b = normals[:, triples, :], bounds[:, triples]
+    size = np.prod(np.linalg.norm(N, axis=-1), axis=-1)
+    independent = np.abs(np.linalg.det(N)) > 1e-9 * size
+    N = np.where(independent[..., None, None], N, np.eye(j))
+    d = np.linalg.solve(N, b[..., None])[..., 0]
+    inside = np.all((d >= low[:, None] - 1e-9) & (d <= high[:, None] + 1e-9), axis=-1) & independent
+    violation = np.max(value[:, None, :] + np.einsum("kmj,kvj->kvm", gradient, d), axis=-1, initial=-np.inf)
+    violation = np.where(inside, np.maximum(violation, 0.0), np.inf)
+    met = violation <= 1e-9
+    aim = np.einsum("kj,kvj->kv", slope, d)
+    rank = np.where(met, 1.0 + _unit(aim), np.where(inside, -violation, -np.inf))
+    best = np.argmax(rank, axis=-1)
+    return np.asarray(np.clip(d[np.arange(k), best], low, high))
+
+
+def _unit(aim: FloatArray) -> FloatArray:
+    """Aims in order, squeezed between 0 and 1 row by row."""
+    top = np.max(np.abs(aim), axis=-1, keepdims=True)
+    return 0.5 + 0.5 * aim / np.where(top > 0, top, 1.0)
+
+
+def _opposite(chosen: tuple[int, ...], constraints: int, j: int) -> bool:
+    """Whether both faces of the box in one direction are chosen: they never meet."""
+    return any(c >= constraints and c < constraints + j and c + j in chosen for c in chosen)

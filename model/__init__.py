@@ -1,0 +1,1 @@
+"""The physics: atmosphere, hinge moments, motion of the tab and aileron, and its linearisation."""

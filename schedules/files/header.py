@@ -1,0 +1,113 @@
+"""What every schedule file says about itself, and the way back from it to a schedule.
+
+One list of names for all formats: members of the JSON document, comment lines of the CSV, fields of
+the MATLAB struct.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from design.gains import Gain
+from design.outcome import Outcomes
+from model.arrays import ObjectArray
+from model.flight import GridAxis
+from schedules.files.checks import require_writable
+from schedules.schedule import (
+    INTERPOLATION_RULE,
+    OUT_OF_RANGE_RULE,
+    SCHEMA_VERSION,
+    SIGN_CONVENTION,
+    GainSchedule,
+    Provenance,
+)
+from schedules.wire_names import axis_name
+
+#: Says which product and which thing a file holds.
+FORMAT = "gainfield gain schedule"
+
+Kind = Literal["negative_feedback", "positive_feedback", "lqr"]
+_PROVENANCE = ("design_id", "design_name", "request_digest", "version", "created_at")
+
+
+def header(schedule: GainSchedule) -> dict[str, str | int]:
+    """The file's words about itself by name, in the order in which they are written."""
+    provenance = {name: str(getattr(schedule.provenance, name)) for name in _PROVENANCE}
+    return {
+        "format": FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        **provenance,
+        "controller": schedule.controller,
+        "kind": schedule.kind,
+        "law": schedule.law,
+        "sign_convention": SIGN_CONVENTION,
+        "interpolation": INTERPOLATION_RULE,
+        "out_of_range": OUT_OF_RANGE_RULE,
+    }
+
+
+def units(schedule: GainSchedule) -> dict[str, str]:
+    """Unit of every axis and gain by its name in the file; ``1`` for none."""
+    axes = {axis_name(axis): axis.unit for axis in schedule.axes}
+    return axes | {gain.name: gain.unit for gain in schedule.gains}
+
+
+def schedule_from(
+    header: Mapping[str, Any], axes: tuple[GridAxis, ...], gains: tuple[Gain, ...], outcomes: Outcomes
+) -> GainSchedule:
+    """Schedule from the parts of a file that was read.
+
+    Raises
+    ------
+    ValueError : not a schedule file, another schema version, a word missing or not text, another
+        rule between the points than this product's, or parts that do not fit together
+    """
+    require_format(header)
+    for name, rule in (("interpolation", INTERPOLATION_RULE), ("out_of_range", OUT_OF_RANGE_RULE)):
+        if _text(header, name) != rule:
+            raise ValueError(f"{name} is {header[name]!r}; only {rule!r} can be read")
+    schedule = GainSchedule(
+        controller=_text(header, "controller"),
+        kind=_kind(_text(header, "kind")),
+        axes=axes,
+        gains=gains,
+        outcomes=outcomes,
+        law=_text(header, "law"),
+        provenance=Provenance(**{name: _text(header, name) for name in _PROVENANCE}),
+    )
+    require_writable(schedule)
+    return schedule
+
+
+def require_format(header: Mapping[str, Any]) -> None:
+    """Refuse what is no schedule file, or one of a schema version that this code does not know."""
+    if header.get("format") != FORMAT:
+        raise ValueError(f"not a schedule file: its format is not {FORMAT!r}")
+    version = header.get("schema_version")
+    if isinstance(version, bool) or version != SCHEMA_VERSION:
+        raise ValueError(f"schema_version is {version!r}; this version reads {SCHEMA_VERSION}")
+
+
+def object_array(items: list[Any], shape: tuple[int, ...]) -> ObjectArray:
+    """Objects in row-major order as an array; numpy would try to look inside them."""
+    array: ObjectArray = np.empty(len(items), dtype=object)
+    array[:] = items
+    return array.reshape(shape)
+
+
+def _text(header: Mapping[str, Any], name: str) -> str:
+    value = header.get(name)
+    if not isinstance(value, str):
+        raise ValueError(f"{name} must be text")
+    return value
+
+
+def _kind(text: str) -> Kind:
+    kinds: tuple[Kind, ...] = get_args(Kind)
+    for kind in kinds:
+        if kind == text:
+            return kind
+    raise ValueError(f"kind is {text!r}; there are: {', '.join(kinds)}")

@@ -1,0 +1,188 @@
+"""From a study to a designed envelope: the one function that notebooks and the service both call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.assess import Assessment, achieved, assess, verdicts
+from design.classical import ClassicalController, design_classical, gain_values
+from design.concurrent import lqr_loop
+from design.gains import Gain
+from design.loop import Loop
+from design.lqr import LqrController, LqrDesign, design_lqr
+from design.outcome import Outcome, Outcomes
+from design.poles import largest_real_part
+from design.specs import Spec, Verdict
+from design.tab_loop import tab_loop
+from schedules.analysis import EnvelopeWarning, PlantEnvelope, analyse
+from schedules.study import Controller, Study
+
+
+@dataclass(frozen=True, eq=False)
+class DesignedController:
+    """One controller over the grid: gains with their outcomes, the loop that is flown, and what is said of it.
+
+    Attributes
+    ----------
+    request : what was asked for
+    outcomes : (*G,)
+    gains : each (*G,), nan where the outcome is not ok
+    loop : over the whole grid, nan where the outcome is not ok
+    assessment : over the whole grid, nan where the outcome is not ok; None when no point is
+    verdicts : one per spec
+    riccati : solution and certificate of the LQR; None for classical controllers
+    """
+
+    request: Controller
+    outcomes: Outcomes
+    gains: tuple[Gain, ...]
+    loop: Loop
+    assessment: Assessment | None
+    verdicts: tuple[Verdict, ...]
+    riccati: LqrDesign | None
+
+
+@dataclass(frozen=True, eq=False)
+class DesignedEnvelope:
+    """A study, its plant and its controllers, over the grid."""
+
+    study: Study
+    plant: PlantEnvelope
+    controllers: tuple[DesignedController, ...]
+    warnings: tuple[EnvelopeWarning, ...]
+
+    def controller(self, name: str) -> DesignedController:
+        """The controller of this name; KeyError when there is none."""
+        for controller in self.controllers:
+            if controller.request.name == name:
+                return controller
+        raise KeyError(name)
+
+
+def run(study: Study) -> DesignedEnvelope:
+    """Design and judge every controller of a study over its grid.
+
+    Raises
+    ------
+    ValueError : the grid cannot be built
+    design.weights.WeightsRefused : weights that cannot work at any point
+    """
+    plant = analyse(study)
+    controllers = tuple(_design(study, plant, request) for request in study.controllers)
+    return DesignedEnvelope(study, plant, controllers, plant.warnings + _trim_warnings(study, plant))
+
+
+def horizon(study: Study, request: Controller) -> float:
+    """How long a controller's step is followed [s]: the reference's duration, or longer where a spec needs it."""
+    limits = [spec.limit for spec in _asked(request) if spec.quantity == "settling_time"]
+    return max([study.reference.duration, *(1.25 * limit for limit in limits)])
+
+
+def _asked(request: Controller) -> tuple[Spec, ...]:
+    return request.specs if isinstance(request, ClassicalController) else ()
+
+
+def _design(study: Study, plant: PlantEnvelope, request: Controller) -> DesignedController:
+    if isinstance(request, ClassicalController):
+        return _classical(study, plant, request)
+    return _lqr(study, plant, request)
+
+
+def _classical(study: Study, plant: PlantEnvelope, request: ClassicalController) -> DesignedController:
+    gains, outcomes = design_classical(
+        plant.servo_tab, study.tab_actuator, request, horizon(study, request), plant.outcomes
+    )
+    loop = tab_loop(plant.model, plant.servo_tab, study.tab_actuator, request, gain_values(gains))
+    return _judged(study, request, outcomes, gains, loop, None)
+
+
+def _lqr(study: Study, plant: PlantEnvelope, request: LqrController) -> DesignedController:
+    design = design_lqr(plant.model, request, plant.outcomes)
+    loop = lqr_loop(plant.model, design)
+    return _judged(study, request, design.outcomes, _matrix_gains(loop, plant.model.inputs), loop, design)
+
+
+def _judged(
+    study: Study,
+    request: Controller,
+    outcomes: Outcomes,
+    gains: tuple[Gain, ...],
+    loop: Loop,
+    riccati: LqrDesign | None,
+) -> DesignedController:
+    """Judge the loop as it is flown, and withdraw every gain that this second look does not bear out."""
+    ok = outcomes.ok
+    if not np.any(ok):
+        return DesignedController(request, outcomes, gains, loop, None, (), riccati)
+    step = np.array([study.reference.aileron])
+    found = assess(loop.take(ok), step, horizon(study, request)).spread(ok)
+    checked = _certify(outcomes, found, _asked(request))
+    if not np.array_equal(checked.ok, ok):
+        kept = loop.take(checked.ok).spread(checked.ok)
+        return _judged(study, request, checked, _kept(gains, checked), kept, riccati)
+    actuators = {"tab": study.tab_actuator, "aileron": study.aileron_actuator}
+    said = verdicts(found, ok, _asked(request), study.spec_pack, actuators)
+    return DesignedController(request, outcomes, gains, loop, found, said, riccati)
+
+
+def _certify(outcomes: Outcomes, found: Assessment, asked: tuple[Spec, ...]) -> Outcomes:
+    """Eigenvalues of the loop in state space must be stable, and the specs that chose the gains must be met."""
+    ok = outcomes.ok
+    growth = np.full(ok.shape, np.nan)
+    growth[ok] = largest_real_part(found.poles[ok])
+    outcomes = outcomes.failing(
+        ok & ~(growth < 0),
+        Outcome.NOT_CERTIFIED,
+        lambda index: f"the closed loop has an eigenvalue with real part {growth[index]:.4g} 1/s",
+    )
+    for spec in asked:
+        values = achieved(found, spec.quantity)
+        if values is None:
+            continue
+        outcomes = outcomes.failing(
+            ok & ~spec.met(values),
+            Outcome.NOT_CERTIFIED,
+            lambda index, spec=spec, values=values: (  # type: ignore[misc]
+                f"judged on the loop that is flown, {spec.quantity} is {values[index]:.6g} "
+                f"against {spec.limit:.6g} asked"
+            ),
+        )
+    return outcomes
+
+
+def _kept(gains: tuple[Gain, ...], outcomes: Outcomes) -> tuple[Gain, ...]:
+    return tuple(Gain(g.name, g.unit, np.where(outcomes.ok, g.values, np.nan)) for g in gains)
+
+
+_STATE_UNITS = {"dt": "rad", "da": "rad", "dt_rate": "rad/s", "da_rate": "rad/s", "int_a": "rad s"}
+
+
+def _matrix_gains(loop: Loop, inputs: tuple[str, ...]) -> tuple[Gain, ...]:
+    """``K_<input>_<state>`` and ``N_<input>_<reference>`` of a state-feedback loop."""
+    feedback = [
+        Gain(f"K_{u}_{x}", f"N m/({_STATE_UNITS[x]})", loop.K[..., i, j])
+        for i, u in enumerate(inputs)
+        for j, x in enumerate(loop.states)
+    ]
+    forward = [
+        Gain(f"N_{u}_{r}", "N m/(rad)", loop.N[..., i, j])
+        for i, u in enumerate(inputs)
+        for j, r in enumerate(loop.references)
+    ]
+    return (*feedback, *forward)
+
+
+def _trim_warnings(study: Study, plant: PlantEnvelope) -> tuple[EnvelopeWarning, ...]:
+    """Tab-only controllers have no actuator for the torque that holds the aileron at its trim."""
+    names = [c.name for c in study.controllers if isinstance(c, ClassicalController)]
+    torque = np.abs(plant.trim.torque[..., 1])
+    held = plant.outcomes.ok & (torque > 1e-9)
+    if not names or not np.any(held):
+        return ()
+    detail = (
+        f"the trim needs an aileron torque of up to {np.max(torque[held]):.4g} N m, which the tab-only controllers "
+        f"({', '.join(names)}) have no actuator for; trim the tab with 'zero_aileron_torque' for a floating aileron"
+    )
+    return (EnvelopeWarning("aileron_torque_at_trim", detail, tuple(int(i) for i in np.flatnonzero(held))),)

@@ -1,0 +1,64 @@
+"""A study: everything a design depends on, in SI and radians. The request of the service, without HTTP."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from design.classical import ClassicalController
+from design.lqr import LqrController
+from model.actuators import Actuator
+from model.aerodynamics import Aerodynamics
+from model.flight import SpeedAxis
+from model.section import Geometry, Inertia
+from model.trim import TrimRequest
+
+Controller = ClassicalController | LqrController
+
+
+@dataclass(frozen=True)
+class GridRequest:
+    """Breakpoints: altitude [m] by `speed_axis` (``dynamic_pressure`` [Pa], ``airspeed`` [m/s], ``mach``)."""
+
+    altitude: tuple[float, ...]
+    speed_axis: SpeedAxis
+    speed: tuple[float, ...]
+    temperature_offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The manoeuvre that actuators are judged on: a step of the aileron from trim.
+
+    Attributes
+    ----------
+    aileron : step size [rad]
+    duration : how long the response is followed [s]
+    """
+
+    aileron: float
+    duration: float
+    kind: Literal["step"] = "step"
+
+
+@dataclass(frozen=True)
+class PlantStudy:
+    """What the linear models depend on: geometry, inertia, air, trim and grid."""
+
+    geometry: Geometry
+    inertia: Inertia
+    aerodynamics: Aerodynamics
+    trim: TrimRequest
+    grid: GridRequest
+
+
+@dataclass(frozen=True)
+class Study(PlantStudy):
+    """The plant, its actuators, the reference they are judged on and the controllers to design."""
+
+    name: str
+    tab_actuator: Actuator
+    aileron_actuator: Actuator
+    reference: Reference
+    controllers: tuple[Controller, ...]
+    spec_pack: str = "default"

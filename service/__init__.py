@@ -1,0 +1,1 @@
+"""The wire: the HTTP service around `schedules.run`."""

@@ -1,0 +1,100 @@
+"""The OpenAPI document: problem answers of every route, and examples that run as they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI
+from pydantic.json_schema import models_json_schema
+
+from service.errors import MEDIA_TYPE, STATUS, problem
+from service.examples import NAMES, example
+from service.refusals import FieldRefusal
+from service.schemas.problem import FieldProblem, Problem
+
+#: What a route that reads a body may refuse it for.
+BODY = (400, 413, 415, 422)
+_PROBLEM = {"$ref": "#/components/schemas/Problem"}
+_FIELD = FieldRefusal("/geometry/chord_m", "must be greater than or equal to 0.001", "m", ">= 0.001 and <= 100")
+_DETAILS = {
+    400: "the body is not JSON: Expecting ',' delimiter at line 3, column 1",
+    404: "there is no design 0123456789abcdef0123456789abcdef",
+    409: "the controller pf has no gains at point 3: infeasible; gain margin is asked to be at least 6 dB",
+    413: "the body has more than 1048576 bytes, the limit max_body_bytes of this server",
+    415: "the body is declared as 'text/plain'; send JSON with the header Content-Type: application/json",
+    422: "/geometry/chord_m: must be greater than or equal to 0.001",
+    503: "the store does not answer: OperationalError",
+}
+
+DESCRIPTION = """
+Gain-scheduled flight-envelope design for tab-aileron control: post a design request, read gains, root loci
+and actuator requirements, download the gain schedule.
+
+Angles are in degrees and every dimensional field ends in its unit; gains are in SI and radians and carry theirs.
+Deflections are positive trailing edge up, the tab's angle is relative to the aileron, and `u = -K x`.
+Errors are problem documents (RFC 9457) that name the field, its unit and what is allowed there.
+"""
+
+
+def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """The `responses` of a route that may refuse a request with these statuses."""
+    return {status: _documented(status) for status in statuses}
+
+
+def _documented(status: int) -> dict[str, Any]:
+    titles = {code: title for number, code, title in STATUS.values() if number == status}
+    code, title = next(iter(titles.items()))
+    shown = problem(status, code, title, _DETAILS[status], [_FIELD] if status == 422 else [])
+    return {
+        "description": f"{HTTPStatus(status).phrase}: `{'`, `'.join(titles)}`",
+        "content": {MEDIA_TYPE: {"schema": _PROBLEM, "example": shown}},
+    }
+
+
+def install(app: FastAPI, example_id: Callable[[], str]) -> None:
+    """Complete the document of the app; `example_id` is the id that the example `wind_tunnel` gets."""
+    plain = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            document = plain()
+            _, definitions = models_json_schema(
+                [(Problem, "serialization"), (FieldProblem, "serialization")],
+                ref_template="#/components/schemas/{model}",
+            )
+            document["components"]["schemas"].update(definitions["$defs"])
+            for path, operations in document["paths"].items():
+                for method, operation in operations.items():
+                    _complete(path, method, operation, example_id())
+        return app.openapi_schema or {}
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _complete(path: str, method: str, operation: dict[str, Any], example_id: str) -> None:
+    """Examples of bodies and parameters, and the answer to a conditional GET."""
+    if method == "get":
+        operation["responses"]["304"] = {"description": "Not modified: the client's `If-None-Match` names this answer"}
+    for parameter in operation.get("parameters", []):
+        if parameter["name"] == "id":
+            parameter["example"] = example_id
+    if "requestBody" in operation:
+        operation["requestBody"]["content"]["application/json"]["examples"] = _bodies(path)
+
+
+def _bodies(path: str) -> dict[str, Any]:
+    wind_tunnel = example(NAMES[0])
+    if path == "/v1/hinge-moments":
+        wire = {
+            "geometry": {"aileron_hinge": 0.7, "tab_hinge": 0.88},
+            "aerodynamics": {"source": "thin_aerofoil", "section": "NACA 23012"},
+            "states": [{"alpha_deg": 5.0, "aileron_deg": 10.0, "tab_deg": -10.0}],
+            "chordwise": [0.25, 0.5],
+        }
+        return {"naca_23012": {"summary": "NACA 23012, hinges at 70 % and 88 %", "value": wire}}
+    if path == "/v1/linear-models":
+        parts = ("geometry", "inertia", "aerodynamics", "atmosphere", "trim", "grid")
+        return {"wind_tunnel": {"summary": "wind_tunnel", "value": {part: wind_tunnel[part] for part in parts}}}
+    return {name: {"summary": name, "value": example(name)} for name in NAMES}

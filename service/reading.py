@@ -1,0 +1,91 @@
+"""Reading a request body: one JSON document in UTF-8, every key once, nothing deeper than Python can follow."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from starlette.requests import ClientDisconnect
+
+from service.refusals import UnreadableBody, UnsupportedMediaType
+
+#: Deeper nesting than any request has, shallow enough for every parser and validator behind.
+MAX_DEPTH = 64
+
+
+def read_json(body: bytes) -> Any:
+    """The JSON document in `body`. NaN and infinities are read as such: validation names the field.
+
+    Raises
+    ------
+    UnreadableBody : not UTF-8, not JSON, a key given twice, nested too deeply, a number with too many digits
+    """
+    try:
+        text = body.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise UnreadableBody(f"the body is not UTF-8: {error.reason} at byte {error.start}") from None
+    try:
+        return json.loads(text, object_pairs_hook=_object)
+    except json.JSONDecodeError as error:
+        raise UnreadableBody(
+            f"the body is not JSON: {error.msg} at line {error.lineno}, column {error.colno}"
+        ) from None
+    except RecursionError:
+        raise UnreadableBody("the body is nested too deeply") from None
+    except ValueError:
+        raise UnreadableBody("the body holds an integer with too many digits") from None
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise UnreadableBody(f"the field {name[:80]!a} is given twice in one object")
+        found[name] = value
+    return found
+
+
+class JsonRequest(Request):
+    """A request whose body is read by `read_json`."""
+
+    _document: Any = None
+
+    async def json(self) -> Any:
+        """The document, as read by `read`."""
+        return self._document
+
+    async def read(self) -> None:
+        """Read and parse the body.
+
+        Raises
+        ------
+        UnsupportedMediaType : the body is not declared as JSON
+        UnreadableBody : `read_json` refuses it, or the connection closed before it was complete
+        """
+        kind = self.headers.get("content-type", "").partition(";")[0].strip().lower()
+        if kind != "application/json" and not (kind.startswith("application/") and kind.endswith("+json")):
+            raise UnsupportedMediaType(
+                f"the body is declared as {kind[:80]!a}; send JSON with the header Content-Type: application/json"
+            )
+        try:
+            self._document = read_json(await self.body())
+        except ClientDisconnect:
+            raise UnreadableBody("the connection closed before the body was complete") from None
+
+
+class JsonRoute(APIRoute):
+    """A route that reads a JSON body by `read_json` before anything else looks at it."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The handler, with the reading before it."""
+        handle = super().get_route_handler()
+
+        async def read_then_handle(request: Request) -> Response:
+            document = JsonRequest(request.scope, request.receive)
+            await document.read()
+            return await handle(document)
+
+        return read_then_handle if self.body_field else handle

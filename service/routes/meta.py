@@ -1,0 +1,48 @@
+"""The server about itself: health, version, limits, and where to begin."""
+
+from __future__ import annotations
+
+import platform
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import RedirectResponse
+
+from service.answering import answer, encode
+from service.limits import listed
+from service.openapi import problems
+from service.schemas.meta import Health, Limits, Version
+from service.state import SettingsHere
+from service.version import code_version, release, solver
+
+router = APIRouter(tags=["server"])
+
+
+@router.get("/", include_in_schema=False)
+def beginning() -> RedirectResponse:
+    """The documentation is the front door."""
+    return RedirectResponse("docs")
+
+
+@router.get("/healthz", response_model=Health, responses=problems())
+def health(request: Request) -> Response:
+    """The process is up."""
+    return answer(request, encode({"status": "ok"}))
+
+
+@router.get("/v1/version", response_model=Version, responses=problems())
+def version(request: Request) -> Response:
+    """Release, digest of the sources, and the numerical libraries."""
+    document = {
+        "name": "Gainfield",
+        "version": release(),
+        "code_version": code_version(),
+        "python": platform.python_version(),
+        "solver": solver(),
+    }
+    return answer(request, encode(document))
+
+
+@router.get("/v1/limits", response_model=Limits, responses=problems())
+def limits(request: Request, settings: SettingsHere) -> Response:
+    """What this server takes, and the settings that say so."""
+    return answer(request, encode({"limits": listed(settings)}))

@@ -1,0 +1,56 @@
+"""Actuators on the wire: one physical actuator a surface, with the bandwidths of its own loops and its limits."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from service.schemas.wire import Request
+
+Bandwidth = Annotated[float, Field(ge=1e-3, le=1e4)]
+Ideal = Annotated[float, Field(ge=0.0, le=0.0)]
+
+
+class Limits(Request):
+    """What the actuator can do; null is unlimited. Limits are judged, they do not steer the design."""
+
+    deflection_deg: Annotated[float, Field(gt=0.0, le=180.0)] | None = None
+    rate_deg_s: Annotated[float, Field(gt=0.0, le=1e6)] | None = None
+    torque_n_m: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
+    power_w: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
+
+
+class AileronActuator(Request):
+    """The aileron's actuator, commanded by torque. This version takes its torque loop as ideal."""
+
+    torque_loop_bandwidth_hz: None = Field(default=None, description="This version: null, an ideal torque loop")
+    delay_s: Ideal = Field(default=0.0, description="Transport delay of the command; this version: none")
+    limits: Limits = Field(default_factory=Limits)
+
+
+class TabActuator(Request):
+    """The tab's actuator, commanded by deflection (servo) or by torque."""
+
+    servo_bandwidth_hz: Bandwidth | None = Field(
+        default=None,
+        description="Natural frequency of the second-order deflection servo; needed by controllers that command "
+        "a tab deflection",
+        examples=[40.0],
+    )
+    servo_damping_ratio: Annotated[float, Field(ge=0.05, le=10.0)] | None = Field(
+        default=None, description="Damping ratio of the deflection servo", examples=[0.7]
+    )
+    rate_loop_bandwidth_hz: Bandwidth | None = Field(
+        default=None, description="Bandwidth of the rate loop, for controllers that command a tab rate"
+    )
+    torque_loop_bandwidth_hz: None = Field(default=None, description="This version: null, an ideal torque loop")
+    delay_s: Ideal = Field(default=0.0, description="Transport delay of the command; this version: none")
+    limits: Limits = Field(default_factory=Limits)
+
+
+class Actuators(Request):
+    """One actuator a surface."""
+
+    tab: TabActuator
+    aileron: AileronActuator

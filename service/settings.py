@@ -1,0 +1,26 @@
+"""Settings of the server: where it listens, where it keeps designs, how much work it takes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+
+class Settings(BaseSettings):
+    """Each is also an environment variable: ``GAINFIELD_`` and the name in capitals."""
+
+    model_config = SettingsConfigDict(env_prefix="GAINFIELD_", extra="ignore", frozen=True)
+
+    host: str = "127.0.0.1"
+    port: int = Field(default=8000, ge=0, le=65535)
+    data_dir: Path = Path("data")
+    max_body_bytes: int = Field(default=1 << 20, ge=1024, description="Bytes of a request body")
+    max_grid_points: int = Field(default=2500, ge=1, description="Points of a grid")
+    max_controllers: int = Field(default=16, ge=1, description="Controllers of a design")
+    max_locus_gains: int = Field(default=2000, ge=2, description="Gains of a root locus")
+    max_response_samples: int = Field(default=5000, ge=2, description="Samples of a response")
+    max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
+    max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
+    kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

@@ -1,0 +1,50 @@
+"""What the routes of one app share: settings, the store, the designs kept ready, the slots for heavy work."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Annotated
+
+from anyio import Semaphore
+from fastapi import Depends, Request
+
+from service.designs import Designs
+from service.settings import Settings
+
+
+@dataclass(frozen=True)
+class State:
+    """Made when the app starts, closed when it stops."""
+
+    settings: Settings
+    designs: Designs
+    slots: Semaphore
+
+
+def state_of(request: Request) -> State:
+    """The state of the app that serves this request."""
+    state: State = request.app.state.shared
+    return state
+
+
+async def slot(request: Request) -> AsyncIterator[None]:
+    """A place among the computations that run at the same time; waits, without a thread, until one is free."""
+    async with state_of(request).slots:
+        yield
+
+
+def settings_of(request: Request) -> Settings:
+    """Settings of the app that serves this request."""
+    return state_of(request).settings
+
+
+def designs_of(request: Request) -> Designs:
+    """Designs of the app that serves this request."""
+    return state_of(request).designs
+
+
+SettingsHere = Annotated[Settings, Depends(settings_of)]
+DesignsHere = Annotated[Designs, Depends(designs_of)]
+#: In the `dependencies` of every route that computes.
+HEAVY = Depends(slot, scope="function")

@@ -1,0 +1,178 @@
+"""From the wire to the domain: each part of a request becomes its dataclass, degrees and Hz become radians."""
+
+from __future__ import annotations
+
+from math import radians, tau
+
+import numpy as np
+
+from design.classical import ClassicalController
+from design.lqr import LqrController
+from design.specs import Spec
+from design.weights import BrysonWeights, ExplicitWeights
+from model.actuators import Actuator, ActuatorLimits
+from model.aerodynamics import Aerodynamics
+from model.flight import SpeedAxis
+from model.hinge_moments.camber import mean_line
+from model.hinge_moments.thin_aerofoil import ThinAerofoil
+from model.section import Body, Geometry, Inertia
+from model.trim import TrimRequest
+from schedules.study import Controller, GridRequest, Reference, Study
+from service.schemas import actuators, aerodynamics, controllers, flight, requests, section, weights
+from service.spec_names import SPEC_FIELDS
+
+SPEED_AXIS: dict[str, SpeedAxis] = {
+    "dynamic_pressure_pa": "dynamic_pressure",
+    "airspeed_m_s": "airspeed",
+    "mach": "mach",
+}
+
+
+def study(request: requests.DesignRequest) -> Study:
+    """The study that a design request asks for."""
+    return Study(
+        name=request.name,
+        geometry=geometry(request.geometry),
+        inertia=inertia(request.inertia),
+        aerodynamics=aerodynamic_model(request.aerodynamics, request.geometry),
+        trim=trim(request.trim),
+        grid=grid(request.grid, request.atmosphere),
+        tab_actuator=tab_actuator(request.actuators.tab),
+        aileron_actuator=aileron_actuator(request.actuators.aileron),
+        reference=Reference(radians(request.reference.aileron_deg), request.reference.duration_s),
+        controllers=tuple(controller(wanted) for wanted in request.controllers),
+        spec_pack=request.spec_pack,
+    )
+
+
+def grid_study(request: requests.LinearModelsRequest) -> Study:
+    """The study of a request that asks for linear models only: ideal actuators, no controllers."""
+    return Study(
+        name="linear models",
+        geometry=geometry(request.geometry),
+        inertia=inertia(request.inertia),
+        aerodynamics=aerodynamic_model(request.aerodynamics, request.geometry),
+        trim=trim(request.trim),
+        grid=grid(request.grid, request.atmosphere),
+        tab_actuator=Actuator(),
+        aileron_actuator=Actuator(),
+        reference=Reference(aileron=radians(1.0), duration=1.0),
+        controllers=(),
+    )
+
+
+def geometry(wire: section.Geometry) -> Geometry:
+    """Geometry of the section; hinges stay fractions of the chord."""
+    return Geometry(wire.chord_m, wire.span_m, wire.aileron_hinge, wire.tab_hinge)
+
+
+def inertia(wire: section.Inertia) -> Inertia:
+    """The two bodies."""
+    return Inertia(aileron=body(wire.aileron), tab=body(wire.tab))
+
+
+def body(wire: section.Body) -> Body:
+    """One body."""
+    return Body(wire.mass_kg, wire.cg_offset_m, wire.inertia_kg_m2)
+
+
+def aerodynamic_model(wire: aerodynamics.Aerodynamics, hinges: section.HingeGeometry) -> Aerodynamics:
+    """Source of hinge moments and its corrections."""
+    return Aerodynamics(
+        source=ThinAerofoil(hinges.aileron_hinge, hinges.tab_hinge, mean_line(wire.section)),
+        damping=wire.damping,
+        virtual_inertia=wire.virtual_inertia,
+        compressibility=wire.compressibility,
+    )
+
+
+def trim(wire: flight.Trim) -> TrimRequest:
+    """Angles in radians; the word `zero_aileron_torque` stays."""
+    tab = wire.tab_deg if isinstance(wire.tab_deg, str) else radians(wire.tab_deg)
+    return TrimRequest(alpha=radians(wire.alpha_deg), aileron=radians(wire.aileron_deg), tab=tab)
+
+
+def grid(wire: flight.Grid, atmosphere: flight.Atmosphere) -> GridRequest:
+    """Breakpoints of both axes, ranges written out."""
+    name, speed = wire.speed_axis
+    return GridRequest(
+        altitude=breakpoints(wire.altitude_m),
+        speed_axis=SPEED_AXIS[name],
+        speed=breakpoints(speed),
+        temperature_offset=atmosphere.temperature_offset_k,
+    )
+
+
+def breakpoints(axis: flight.Axis) -> tuple[float, ...]:
+    """The breakpoints of an axis; a range has both its ends exactly."""
+    if not isinstance(axis, flight.Span):
+        return tuple(axis)
+    spaced = np.linspace if axis.spacing == "linear" else np.geomspace
+    values = spaced(axis.from_, axis.to, axis.count).tolist()
+    return (axis.from_, *values[1:-1], axis.to)
+
+
+def tab_actuator(wire: actuators.TabActuator) -> Actuator:
+    """The tab's actuator; bandwidths from Hz to rad/s."""
+    return Actuator(
+        servo_bandwidth=_rad_s(wire.servo_bandwidth_hz),
+        servo_damping_ratio=wire.servo_damping_ratio,
+        rate_loop_bandwidth=_rad_s(wire.rate_loop_bandwidth_hz),
+        torque_loop_bandwidth=_rad_s(wire.torque_loop_bandwidth_hz),
+        delay=wire.delay_s,
+        limits=limits(wire.limits),
+    )
+
+
+def aileron_actuator(wire: actuators.AileronActuator) -> Actuator:
+    """The aileron's actuator."""
+    return Actuator(
+        torque_loop_bandwidth=_rad_s(wire.torque_loop_bandwidth_hz), delay=wire.delay_s, limits=limits(wire.limits)
+    )
+
+
+def limits(wire: actuators.Limits) -> ActuatorLimits:
+    """Limits; None stays unlimited."""
+    return ActuatorLimits(
+        deflection=None if wire.deflection_deg is None else radians(wire.deflection_deg),
+        rate=None if wire.rate_deg_s is None else radians(wire.rate_deg_s),
+        torque=wire.torque_n_m,
+        power=wire.power_w,
+    )
+
+
+def controller(wire: controllers.Controller) -> Controller:
+    """A controller by its kind."""
+    if isinstance(wire, controllers.Lqr):
+        return LqrController(wire.name, lqr_weights(wire.weights), wire.tab_allocation)
+    cut_off = wire.rate_filter_hz if isinstance(wire, controllers.NegativeFeedback) else None
+    return ClassicalController(wire.name, wire.kind, specs(wire.specs), _rad_s(cut_off))
+
+
+def specs(wire: controllers.Specs) -> tuple[Spec, ...]:
+    """The specs that were given, each in the unit of its quantity."""
+    given = {name: getattr(wire, name) for name in type(wire).model_fields}
+    return tuple(SPEC_FIELDS[name].spec(value) for name, value in given.items() if value is not None)
+
+
+def lqr_weights(wire: controllers.Weights) -> BrysonWeights | ExplicitWeights:
+    """Weights by their rule; Bryson's angles from degrees to radians."""
+    if isinstance(wire, weights.BrysonWeights):
+        return BrysonWeights(
+            aileron=radians(wire.aileron_deg),
+            aileron_rate=radians(wire.aileron_rate_deg_s),
+            tab=radians(wire.tab_deg),
+            tab_rate=radians(wire.tab_rate_deg_s),
+            aileron_integral=radians(wire.aileron_integral_deg_s),
+            tab_torque=wire.tab_torque_n_m,
+            aileron_torque=wire.aileron_torque_n_m,
+        )
+    return ExplicitWeights(
+        Q=np.array(wire.Q, dtype=float),
+        R=np.array(wire.R, dtype=float),
+        N=None if wire.N is None else np.array(wire.N, dtype=float),
+    )
+
+
+def _rad_s(frequency_hz: float | None) -> float | None:
+    return None if frequency_hz is None else tau * frequency_hz
