@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.arrays import ComplexArray, FloatArray
+from model.arrays import FloatArray
 
 #: -3 dB as everybody means it: half the power.
 LEVEL = np.sqrt(0.5)

@@ -7,6 +7,7 @@ those that are damped enough, then the step of those whose margins are near enou
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from model.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 #: A candidate that misses a spec by more than this part of it is not judged any further.
 NEAR = 0.5
-FREQUENCIES = 220
+FREQUENCIES = 140
 TIMES = 320
 #: Oscillatory modes whose damping is followed, least damped first.
 MODES = 3
@@ -50,6 +51,69 @@ class Judged:
         """These figures where `keep`, those of `other` elsewhere."""
         values = {name: np.where(keep, v, other.values[name]) for name, v in self.values.items()}
         return Judged(values, np.where(keep, self.bandwidth, other.bandwidth))
+
+
+class _FrequencyResponse:
+    """Loop transfers of K candidates, each at its own point: sampled, and exact wherever a crossing is refined."""
+
+    def __init__(self, form: NormalForm, x: FloatArray, terms: ComplexArray, at: IntArray, kappa: FloatArray) -> None:
+        self.form, self.at, self.kappa = form, at, kappa
+        self.x = x[at]
+        self.L = np.einsum("kj,kjw->kw", kappa, terms[at])
+        self.T = kappa[:, -1:] * terms[at, -1, :] / (1.0 + self.L)
+
+    def _exact(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """L and T of every candidate at its own frequency x (K,)."""
+        powers = (1j * x)[:, None] ** np.arange(self.form.denominator.shape[-1] - 1, -1, -1)
+        d = np.einsum("kn,kn->k", powers, self.form.denominator[self.at])
+        terms = np.einsum("kn,kjn->kj", powers, self.form.numerators[self.at]) / d[:, None]
+        L = np.einsum("kj,kj->k", self.kappa, terms)
+        return L, self.kappa[:, -1] * terms[:, -1] / (1.0 + L)
+
+    def _refined(
+        self, f: Callable[[ComplexArray, ComplexArray], FloatArray], k: IntArray
+    ) -> tuple[FloatArray, ComplexArray]:
+        """Root of f(L, T) between samples k and k + 1, by false position in log x: the frequency, and L there."""
+        row = np.arange(k.size)
+        low, high = np.log(self.x[row, k]), np.log(self.x[row, k + 1])
+        f_low, f_high = (f(self.L[row, i], self.T[row, i]) for i in (k, k + 1))
+        for _ in range(3):
+            u = low - f_low * (high - low) / np.where(f_high == f_low, np.inf, f_high - f_low)
+            L, T = self._exact(np.exp(u))
+            f_u = f(L, T)
+            left = f_u * f_low > 0
+            low, f_low = np.where(left, u, low), np.where(left, f_u, f_low)
+            high, f_high = np.where(left, high, u), np.where(left, f_high, f_u)
+        return np.exp(u), L
+
+    def gain_margin_db(self) -> FloatArray:
+        """Smallest change of gain, up or down [dB], that puts the locus through -1."""
+        re, im = self.L.real, self.L.imag
+        crosses = im[:, 1:] * im[:, :-1] < 0
+        part = im[:, :-1] / np.where(crosses, im[:, :-1] - im[:, 1:], 1.0)
+        at = re[:, :-1] + part * (re[:, 1:] - re[:, :-1])
+        crosses &= at < 0
+        change = np.where(crosses, np.abs(np.log(np.where(crosses, -at, 1.0))), np.inf)
+        _, L = self._refined(lambda L, T: L.imag, np.argmin(change, axis=-1))
+        refined = np.abs(20.0 * np.log10(np.maximum(-L.real, 1e-10)))
+        return np.where(crosses.any(axis=-1), refined, NO_LIMIT_DB)
+
+    def phase_margin(self) -> FloatArray:
+        """Smallest angle [rad] between -1 and the locus where |L| = 1."""
+        m = np.log(np.abs(self.L))
+        crosses = m[:, 1:] * m[:, :-1] < 0
+        part = m[:, :-1] / np.where(crosses, m[:, :-1] - m[:, 1:], 1.0)
+        at = self.L[:, :-1] + part * (self.L[:, 1:] - self.L[:, :-1])
+        worst = np.argmin(np.where(crosses, np.abs(np.angle(-at)), np.inf), axis=-1)
+        _, L = self._refined(lambda L, T: np.log(np.abs(L)), worst)
+        return np.where(crosses.any(axis=-1), np.abs(np.angle(-L)), np.pi)
+
+    def bandwidth(self) -> FloatArray:
+        """First frequency [rad/s] at which |T| falls below -3 dB."""
+        below = np.abs(self.T) < np.sqrt(0.5)
+        k = np.clip(np.argmax(below, axis=-1) - 1, 0, None)
+        x, _ = self._refined(lambda L, T: np.log(np.abs(T) * np.sqrt(2.0)), k)
+        return np.where(below.any(axis=-1), x * self.form.frequency[self.at], np.nan)
 
 
 class CandidateJudge:
@@ -114,26 +178,15 @@ class CandidateJudge:
         keep = np.max(roots.real, axis=-1) < 0
         keep &= _near(judged, rows, specs, ("damping_ratio",))
         rows, at, kappa, polynomial, roots = rows[keep], at[keep], kappa[keep], polynomial[keep], roots[keep]
-        L = np.einsum("kj,kjw->kw", kappa, self.terms[at])
-        values["gain_margin"][rows] = _gain_margin_db(L)
-        values["phase_margin"][rows] = _phase_margin(L)
-        judged.bandwidth[rows] = self._bandwidth(at, kappa, L)
+        frequency = _FrequencyResponse(self.form, self.x, self.terms, at, kappa)
+        values["gain_margin"][rows] = frequency.gain_margin_db()
+        values["phase_margin"][rows] = frequency.phase_margin()
+        judged.bandwidth[rows] = frequency.bandwidth()
         keep = _near(judged, rows, specs, ("gain_margin", "phase_margin"))
         if not {"settling_time", "overshoot"} & {s.quantity for s in specs}:
             return
         rows, at, kappa, polynomial, roots = rows[keep], at[keep], kappa[keep], polynomial[keep], roots[keep]
         values["overshoot"][rows], values["settling_time"][rows] = self._step(at, kappa, polynomial, roots)
-
-    def _bandwidth(self, at: IntArray, kappa: FloatArray, L: ComplexArray) -> FloatArray:
-        """First frequency [rad/s] at which |T| falls below -3 dB."""
-        T = np.abs(kappa[:, -1:] * self.terms[at, -1, :] / (1.0 + L)) * np.sqrt(2.0)
-        below = T < 1.0
-        k = np.clip(np.argmax(below, axis=-1), 1, None)
-        row = np.arange(at.size)
-        part = np.log(T[row, k - 1]) / np.log(T[row, k - 1] / T[row, k])
-        low, high = self.x[at, k - 1], self.x[at, k]
-        omega = self.form.frequency[at] * low * (high / low) ** np.clip(part, 0.0, 1.0)
-        return np.where(below.any(axis=-1), omega, np.nan)
 
     def _step(
         self, at: IntArray, kappa: FloatArray, polynomial: FloatArray, roots: ComplexArray
@@ -167,25 +220,6 @@ def _roots(polynomial: FloatArray) -> ComplexArray:
     companion[..., 0, :] = -polynomial[..., 1:] / polynomial[..., :1]
     companion[..., np.arange(1, n), np.arange(n - 1)] = 1.0
     return np.asarray(np.linalg.eigvals(companion), dtype=complex)
-
-
-def _gain_margin_db(L: ComplexArray) -> FloatArray:
-    """Smallest change of gain, up or down [dB], that puts the locus through -1: crossings of the negative axis."""
-    re, im = L.real, L.imag
-    crosses = im[:, 1:] * im[:, :-1] < 0
-    part = im[:, :-1] / np.where(crosses, im[:, :-1] - im[:, 1:], 1.0)
-    at = re[:, :-1] + part * (re[:, 1:] - re[:, :-1])
-    decibels = np.abs(20.0 * np.log10(np.where(crosses & (at < 0), -at, 1e-10)))
-    return np.asarray(np.min(np.where(crosses & (at < 0), decibels, NO_LIMIT_DB), axis=-1))
-
-
-def _phase_margin(L: ComplexArray) -> FloatArray:
-    """Smallest angle [rad] between -1 and the locus where |L| = 1."""
-    m = np.log(np.abs(L))
-    crosses = m[:, 1:] * m[:, :-1] < 0
-    part = m[:, :-1] / np.where(crosses, m[:, :-1] - m[:, 1:], 1.0)
-    at = L[:, :-1] + part * (L[:, 1:] - L[:, :-1])
-    return np.asarray(np.min(np.where(crosses, np.abs(np.angle(-at)), np.pi), axis=-1))
 
 
 def _peak(error: FloatArray) -> FloatArray:

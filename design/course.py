@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.interpolant import Extremes, crossings, local_maxima, windows
-from model.arrays import BoolArray, FloatArray, GridArrays, IntArray
+from model.arrays import FloatArray, GridArrays, IntArray
 
 #: A sampled maximum lies above this part of the maximum it stands for, on samples that resolve the signal.
 SAMPLED_PART = 0.8
@@ -66,19 +66,60 @@ class Course:
 
     def peak(self) -> Peak:
         """Largest value of each course and its time."""
-        flat = self.flat
-        index = np.argmax(flat, axis=-1)
-        value = np.take_along_axis(flat, index[:, None], axis=-1)[:, 0]
+        index = np.argmax(self.flat, axis=-1)
+        value = np.take_along_axis(self.flat, index[:, None], axis=-1)[:, 0]
         time = self.times.reshape(-1)[index]
         found = self._maxima(self.fraction)
-        point, when = found.row // len(self.times), self._time(found.row, found.place)
-        for e in np.argsort(found.value, kind="stable"):
-            pass
+        point = found.row // len(self.times)
+        higher = np.flatnonzero(found.value > value[point])
+        # Of several maxima of one point the last written stays: the highest, so they are written in order.
+        order = higher[np.argsort(found.value[higher], kind="stable")]
+        value[point[order]] = found.value[order]
+        time[point[order]] = self._time(found.row[order], found.place[order])
         return Peak(value, time)
 
     def undershoot(self) -> FloatArray:
         """(N,) largest excursion the wrong way, >= 0."""
+        largest: FloatArray = np.maximum(np.max(-self.flat, axis=-1), 0.0)
         found = self._maxima(-self.fraction)
-        largest = np.maximum(np.max(-self.flat, axis=-1), 0.0)
         np.maximum.at(largest, found.row // len(self.times), found.value)
         return largest
+
+    def _time(self, row: IntArray, place: FloatArray) -> FloatArray:
+        """(E,) time [s] of places [samples] in rows."""
+        block = row % len(self.times)
+        start = self.times[block, 0]
+        return np.asarray(start + (self.times[block, 1] - start) * place)
+
+    def _maxima(self, signal: FloatArray) -> Extremes:
+        """Refined local maxima among the largest of each point."""
+        top = np.max(signal, axis=(-2, -1))
+        return local_maxima(signal, SAMPLED_PART * top, NOISE * np.abs(top))
+
+    def _crossing_time(self, index: IntArray, level: FloatArray) -> FloatArray:
+        """(N,) time at which the level is crossed between sample `index` and the one before it."""
+        samples = self.times.shape[-1]
+        time: FloatArray = self.times.reshape(-1)[index]  # right as it is where `index` begins a block
+        between = np.flatnonzero(index % samples > 0)
+        row = between * len(self.times) + index[between] // samples
+        place = crossings(self.rows, row, index[between] % samples - 1, level[between])
+        time[between] = self._time(row, place)
+        return time
+
+    def _after_hidden_excursions(self, settled: FloatArray, band: float) -> FloatArray:
+        """Settling times moved behind peaks that leave the band between two samples that do not."""
+        error = self.fraction - 1.0
+        floor = np.full(len(error), SAMPLED_PART * band)
+        found = local_maxima(np.abs(error), floor, NOISE * floor, signed=error)
+        error = error.reshape(self.rows.shape)
+        sampled = np.abs(error)[found.row, np.round(found.place).astype(np.int64)]
+        point = found.row // len(self.times)
+        time = self._time(found.row, found.place)
+        hidden = np.flatnonzero((found.value > band) & (sampled <= band) & (time > settled[point]))
+        row, place = found.row[hidden], found.place[hidden]
+        curve = windows(error, row, place)
+        level = band * np.sign(curve.value(place))
+        end = np.minimum(np.floor(place) + 1.0, float(self.times.shape[-1] - 1))
+        back = curve.minus(level).root(place, end, 0.5 * (place + end))
+        np.maximum.at(settled, point[hidden], self._time(row, back))
+        return settled

@@ -16,9 +16,10 @@ from design.feedback import ClosedLoop, complementary, log_slope, open_loop_valu
 from design.polynomials import imaginary_cross, roots, squared_magnitude
 from model.arrays import ComplexArray, FloatArray, GridArrays
 
-#: A root counts as real when its imaginary part is below this part of its size (the curve touches), and a
-#: Newton step as settled when it is below this part of the frequency.
-NEARLY = 1e-6
+#: A root counts as real when its imaginary part is below this part of its size (the curve touches).
+NEARLY_REAL = 1e-6
+#: A Newton step from a root of the polynomials is never longer than this part of the frequency.
+SETTLED = 1e-5
 #: Gain ratios outside this range are no margins but the trace of a pole at the origin, or of no loop at all.
 RATIO_RANGE = (1e-6, 1e6)
 #: With a delay, how many crossings of the real axis are kept.
@@ -56,10 +57,9 @@ def phase_crossings(loop: ClosedLoop) -> Crossings:
     found = _polished(loop, start, _imaginary, loop.delayed)
     distance = np.abs(np.log(critical_ratio(found.value)))
     nearest = np.argsort(distance, axis=-1)[:, :width]
-    omega, value, slope, distance = (
-        np.take_along_axis(v, nearest, axis=-1) for v in (found.omega, found.value, found.slope, distance)
-    )
-    return _sorted(np.where(np.isnan(distance), np.nan, omega), value, slope)
+    omega = np.where(np.isnan(distance), np.nan, found.omega)
+    value, slope = (np.take_along_axis(v, nearest, axis=-1) for v in (found.value, found.slope))
+    return _sorted(np.take_along_axis(omega, nearest, axis=-1), value, slope)
 
 
 def critical_ratio(T: ComplexArray) -> FloatArray:
@@ -73,7 +73,7 @@ def positive_roots(p: FloatArray) -> FloatArray:
     """Positive real roots of (N, m+1), (N, m) nan padded; of a pair that rounding took off the axis, one."""
     x = roots(p)
     with np.errstate(invalid="ignore"):
-        real = (x.real > 0.0) & (x.imag >= 0.0) & (x.imag <= NEARLY * np.abs(x))
+        real = (x.real > 0.0) & (x.imag >= 0.0) & (x.imag <= NEARLY_REAL * np.abs(x))
     return np.where(real, x.real, np.nan)
 
 
@@ -92,27 +92,25 @@ def _imaginary(T: ComplexArray, slope: ComplexArray) -> tuple[FloatArray, FloatA
 
 
 def _polished(loop: ClosedLoop, start: FloatArray, residual: Residual, delayed: bool) -> Crossings:
-    """Newton steps from `start` (N, M); what does not settle was no crossing and is dropped."""
+    """One Newton step from `start` (N, M); what is not there already was no crossing and is dropped."""
     valid = ~np.isnan(start)
     rows = np.nonzero(valid)[0]
     w = start[valid]
-    step = np.zeros_like(w)
-    for _ in range(2):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            error, rate = residual(*complementary(loop, rows, w, delayed))
-            step = np.where(error == 0.0, 0.0, error / rate)
-        step = np.where(np.isfinite(step), step, np.inf)
-        w = np.where(np.isfinite(step), np.abs(w - step), w)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error, rate = residual(*complementary(loop, rows, w, delayed))
+        step = np.where(error == 0.0, 0.0, error / rate)
+        close = np.abs(step) <= SETTLED * w
+    w = np.where(close, w - step, w)
     T, T_slope = complementary(loop, rows, w, delayed)
     omega = np.full(start.shape, np.nan)
     value, slope = (np.full(start.shape, complex(np.nan, np.nan)) for _ in range(2))
-    omega[valid] = np.where(np.abs(step) <= NEARLY * w, w, np.nan)
-    value[valid], slope[valid] = T, T_slope
+    omega[valid], value[valid], slope[valid] = np.where(close, w, np.nan), T, T_slope
     return _sorted(omega, value, slope)
 
 
 def _sorted(omega: FloatArray, value: ComplexArray, slope: ComplexArray) -> Crossings:
     order = np.argsort(omega, axis=-1)
-    omega, value, slope = (np.take_along_axis(v, order, axis=-1) for v in (omega, value, slope))
-    gone = np.isnan(omega)
-    return Crossings(omega, np.where(gone, np.nan, value), np.where(gone, np.nan, slope))
+    frequency = np.take_along_axis(omega, order, axis=-1)
+    gone = np.isnan(frequency)
+    T, T_slope = (np.where(gone, np.nan, np.take_along_axis(v, order, axis=-1)) for v in (value, slope))
+    return Crossings(frequency, T, T_slope)

@@ -9,6 +9,7 @@ where ``Re T = 1/2``; the sensitivity is ``1 - T``. A delay multiplies L by ``ex
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from design.loop import SisoLoop
 from design.polynomials import power_of_two_scale
 from design.transfer import Transfer, response, transfer
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
+
+
+AnyArray = TypeVar("AnyArray", FloatArray, ComplexArray)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,23 +64,20 @@ def closed_loop(loop: SisoLoop) -> ClosedLoop:
     b = loop.b.reshape(-1, n) * (loop.sign * loop.gain.reshape(-1))[:, None]
     open_loop = transfer(A, b, c)
     scale = power_of_two_scale(open_loop.denominator + open_loop.numerator)
-    closed = (A - b[:, :, None] * c[:, None, :]) / scale[:, None, None]
+    scaled = open_loop.scaled(scale)
+    b = b / scale[:, None]
+    closed = A / scale[:, None, None] - b[:, :, None] * c[:, None, :]
     poles = np.linalg.eigvals(closed).astype(complex)
     regular = np.abs(poles.real).min(axis=-1) > 1e-12 * np.abs(poles).max(axis=-1)
-    nothing = np.zeros(n + 1)
-    return ClosedLoop(
-        np.where(regular[:, None, None], closed, -np.eye(n)),
-        np.where(regular[:, None], b / scale[:, None], 0.0),
-        c,
-        Transfer(
-            np.where(regular[:, None], open_loop.scaled(scale).numerator, nothing),
-            np.where(regular[:, None], open_loop.scaled(scale).denominator, np.poly(-np.ones(n))),
-        ),
-        np.where(regular[:, None], poles, -1.0),
-        scale,
-        loop.delay * scale,
-        regular,
-    )
+    if not regular.all():
+        closed, b, poles = (_replaced(v, regular, w) for v, w in ((closed, -np.eye(n)), (b, 0.0), (poles, -1.0)))
+        no_loop = (scaled.numerator, 0.0), (scaled.denominator, np.poly(-np.ones(n)))
+        scaled = Transfer(*(_replaced(v, regular, w) for v, w in no_loop))
+    return ClosedLoop(closed, b, c, scaled, poles, scale, loop.delay * scale, regular)
+
+
+def _replaced(values: AnyArray, kept: BoolArray, others: FloatArray | float) -> AnyArray:
+    return np.where(kept.reshape(-1, *(1,) * (values.ndim - 1)), values, others)
 
 
 def complementary(

@@ -20,9 +20,9 @@ from model.arrays import ComplexArray, FloatArray, GridArrays
 RESOLUTION = 0.125
 #: Sample intervals of a block and number of blocks where nothing asks for more: every grid whose modes
 #: these resolve has the same mesh, so a point's numbers do not depend on its neighbours.
-INTERVALS, BLOCKS = 64, 9
+INTERVALS, BLOCKS = 32, 10
 #: A mode needs RESOLUTION for no longer than it takes to decay; intervals of a block, times damping ratio.
-FADING = 32.0
+FADING = 16.0
 #: Bounds of the mesh; reached only by a fast mode of next to no damping, or by one beyond all actuators.
 LARGEST_INTERVALS, LARGEST_BLOCKS = 4096, 29
 
@@ -84,7 +84,7 @@ def graded_states(generator: FloatArray, poles: ComplexArray, duration: float) -
     """
     intervals = _needed_intervals(poles, duration)
     blocks = _needed_blocks(poles, duration, intervals)
-    passes = int(intervals).bit_length() - 1
+    passes = intervals.bit_length() - 1
     with np.errstate(over="ignore", invalid="ignore"):
         chain = [expm(generator * _block_steps(duration, intervals, blocks)[0])]
         while len(chain) < passes + blocks:
@@ -119,7 +119,7 @@ def _needed_intervals(poles: ComplexArray, duration: float) -> int:
     fading = np.maximum(-poles.real, FADING * 1e-6 * size)
     turns = np.minimum(0.5 * size * duration / RESOLUTION, FADING * size / np.where(size > 0.0, fading, 1.0))
     needed = float(np.max(turns, initial=1.0))
-    return min(max(INTERVALS, 2 ** int(np.ceil(np.log2(needed)))), LARGEST_INTERVALS)
+    return min(max(INTERVALS, 1 << int(np.ceil(np.log2(needed)))), LARGEST_INTERVALS)
 
 
 def _needed_blocks(poles: ComplexArray, duration: float, intervals: int) -> int:

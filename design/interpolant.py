@@ -18,8 +18,12 @@ from model.arrays import BoolArray, FloatArray, IntArray
 POINTS = 10
 _HALF = 0.5 * (POINTS - 1)
 #: Monomial coefficients in u in [-1, 1] from the samples of a window.
-_FIT: FloatArray = np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, POINTS), increasing=True))
+_FIT: FloatArray = np.asarray(
+    np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, POINTS), increasing=True)), dtype=np.float64
+)
 _NEWTON_PASSES = 8
+#: A Newton step this short [samples] was the last one.
+_CLOSE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +41,7 @@ class Polynomials:
 
     def value(self, s: FloatArray) -> FloatArray:
         """(E,) values at s [samples]."""
-        return _horner(self.coefficients, (s - self.origin) / _HALF)
+        return _sum_of_powers(self.coefficients, (s - self.origin) / _HALF)
 
     def derivative(self) -> Polynomials:
         """Derivatives with respect to s [1/sample]."""
@@ -58,32 +62,36 @@ class Polynomials:
         """(E,) integrals over s from low to high [samples]."""
         powers = np.arange(1, self.coefficients.shape[0] + 1)[:, None] / _HALF
         primitive = np.concatenate([np.zeros((1, self.origin.size)), self.coefficients / powers])
-        ends = [_horner(primitive, (s - self.origin) / _HALF) for s in (low, high)]
+        ends = [_sum_of_powers(primitive, (s - self.origin) / _HALF) for s in (low, high)]
         return np.asarray(ends[1] - ends[0])
 
     def root(self, low: FloatArray, high: FloatArray, start: FloatArray) -> FloatArray:
-        """(E,) where each one falls through zero in [low, high], or rises through it when it begins below.
+        """(E,) where each one crosses zero in [low, high]; `start` where its ends have the same sign.
 
         Newton's method held in a shrinking bracket: a step that leaves it is replaced by the middle.
         """
         slope = self.derivative()
-        falling = np.where(self.value(low) >= 0.0, 1.0, -1.0)
+        below = self.value(low) < 0.0
+        crosses = below != (self.value(high) < 0.0)
         s = start
         for _ in range(_NEWTON_PASSES):
             value, change = self.value(s), slope.value(s)
-            before = falling * value > 0.0
+            before = (value < 0.0) == below
             low, high = np.where(before, s, low), np.where(before, high, s)
-            s = s - value / np.where(change == 0.0, np.inf, change)
-            s = np.where((s >= low) & (s <= high), s, 0.5 * (low + high))
+            step = np.where(crosses, value / np.where(change == 0.0, np.inf, change), 0.0)
+            s = s - step
+            s = np.where((s >= low) & (s <= high) | ~crosses, s, 0.5 * (low + high))
+            if not np.any(np.abs(step) > _CLOSE):
+                break
         return s
 
 
-def _horner(coefficients: FloatArray, u: FloatArray) -> FloatArray:
-    total = coefficients[-1].copy()
-    for c in coefficients[-2::-1]:
-        total *= u
-        total += c
-    return total
+def _sum_of_powers(coefficients: FloatArray, u: FloatArray) -> FloatArray:
+    """(E,) values of polynomials (P, E) at u (E,)."""
+    powers = np.empty(coefficients.shape)
+    powers[0], powers[1:] = 1.0, u
+    np.multiply.accumulate(powers, axis=0, out=powers)
+    return np.asarray(np.einsum("pe,pe->e", coefficients, powers))
 
 
 def windows(block: FloatArray, row: IntArray, near: FloatArray) -> Polynomials:
@@ -98,12 +106,12 @@ def windows(block: FloatArray, row: IntArray, near: FloatArray) -> Polynomials:
     first = np.clip(np.ceil(near - 0.5 * POINTS).astype(np.int64), 0, block.shape[-1] - POINTS)
     base = row * block.shape[-1] + first
     samples = block.reshape(-1)[base + np.arange(POINTS)[:, None]]
-    return Polynomials(_FIT @ samples, first + _HALF)
+    return Polynomials(_FIT @ samples, np.asarray(first + _HALF, dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)
 class Extremes:
-    """Local maxima between the samples, one per event: row, place [samples] and value."""
+    """Local maxima between the samples, one per event (E,): row, place [samples] and value."""
 
     row: IntArray
     place: FloatArray
@@ -111,36 +119,36 @@ class Extremes:
 
 
 def local_maxima(
-    block: FloatArray, floor: FloatArray, noise: FloatArray, signed: FloatArray | None = None
+    signal: FloatArray, floor: FloatArray, noise: FloatArray, signed: FloatArray | None = None
 ) -> Extremes:
-    """Refine every sampled local maximum that reaches the floor of its row.
+    """Refine every sampled local maximum that reaches the floor of its signal.
 
     Parameters
     ----------
-    block : (B, m+1) rows of even samples
+    signal : (B, S, m+1) rows of even samples; the last sample of a block is the first of the next
     floor : (B,) sampled maxima below it are left out
     noise : (B,) a sample stands out when it exceeds one of its neighbours by more than this
-    signed : (B, m+1) where `block` is a magnitude, the smooth signal that it is the magnitude of
+    signed : (B, S, m+1) where `signal` is a magnitude, the smooth signal that it is the magnitude of
 
     Returns
     -------
-    Extremes; no value is below the sample it was found from
+    Extremes, rows counted over B S; no value is below the sample it was found from
     """
-    last = block.shape[-1] - 1
-    flat = block.reshape(-1)
-    index = np.flatnonzero(block >= floor[:, None])
-    row, k = np.divmod(index, last + 1)
-    here = flat[index]
-    lower = np.minimum(flat[index - (k > 0)], flat[index + (k < last)])
-    upper = np.maximum(flat[index - (k > 0)], flat[index + (k < last)])
-    stands = (here >= upper) & (here - lower > noise[row])
-    index, row, k, here = index[stands], row[stands], k[stands], here[stands]
-    at = k.astype(float)
-    if signed is None:
-        curve = windows(block, row, at)
-    else:
-        curve = windows(signed, row, at).times(np.sign(signed.reshape(-1)[index]))
-    place = curve.derivative().root(np.maximum(at - 1.0, 0.0), np.minimum(at + 1.0, float(last)), at)
+    blocks, samples = signal.shape[-2:]
+    flat = signal.reshape(-1)
+    index = np.flatnonzero(signal >= floor[:, None, None])
+    row, k = np.divmod(index, samples)
+    # The neighbour across the joint of two blocks is two places off: the joint is there twice.
+    back = np.where(k > 0, 1, np.where(row % blocks > 0, 2, 0))
+    ahead = np.where(k < samples - 1, 1, np.where(row % blocks < blocks - 1, 2, 0))
+    here, before, after = flat[index], flat[index - back], flat[index + ahead]
+    stands = (here >= before) & (here >= after) & (here - np.minimum(before, after) > noise[row // blocks])
+    index, row, here, at = index[stands], row[stands], here[stands], k[stands].astype(float)
+    rows = (signal if signed is None else signed).reshape(-1, samples)
+    curve = windows(rows, row, at)
+    if signed is not None:
+        curve = curve.times(np.sign(signed.reshape(-1)[index]))
+    place = curve.derivative().root(np.maximum(at - 1.0, 0.0), np.minimum(at + 1.0, samples - 1.0), at)
     value = curve.value(place)
     better = value > here
     return Extremes(row, np.where(better, place, at), np.where(better, value, here))
@@ -171,13 +179,11 @@ def interval_integrals(intervals: int) -> FloatArray:
     matrix = np.zeros((intervals + 1, intervals))
     matrix[first[:, None] + np.arange(POINTS), k[:, None]] = moments @ _FIT
     matrix.flags.writeable = False
-    return matrix
+    return np.asarray(matrix)
 
 
 def sign_changes(block: FloatArray, noise: FloatArray) -> BoolArray:
     """(B, m) intervals at whose ends the signal has opposite signs, one of them beyond the noise (B,)."""
     clear = np.abs(block) > noise[:, None]
     opposite = (block[:, :-1] > 0.0) != (block[:, 1:] > 0.0)
-    return np.asarray(
-        opposite & (clear[:, :-1] | clear[:, 1:]) & (block[:, :-1] != 0.0) & (block[:, 1:] != 0.0)
-    )
+    return np.asarray(opposite & (clear[:, :-1] | clear[:, 1:]) & (block[:, :-1] != 0.0) & (block[:, 1:] != 0.0))

@@ -9,7 +9,7 @@ import numpy as np
 from design.crossovers import Crossings, critical_ratio, gain_crossings, phase_crossings
 from design.feedback import ClosedLoop, closed_loop, log_slope, open_loop_value
 from design.loop import SisoLoop
-from design.peaks import balanced_peak, sensitivity_peak
+from design.peaks import peaks
 from model.arrays import BoolArray, FloatArray, GridArrays
 
 TURN = 2.0 * np.pi
@@ -70,7 +70,7 @@ def margins(loop: SisoLoop) -> Margins:
         raise ValueError(f"delay must not be negative, is {loop.delay} s")
     closed = closed_loop(loop)
     gain, unity = phase_crossings(closed), gain_crossings(closed)
-    ratio = critical_ratio(gain.value)
+    ratio, peak = critical_ratio(gain.value), peaks(closed)
     phase = _phase(closed, unity)
     # Where there is no crossover the column picked is nan, and says so.
     nearest = np.argmin(_without_nan(np.abs(phase)), axis=-1)[:, None]
@@ -85,8 +85,8 @@ def margins(loop: SisoLoop) -> Margins:
         _without_nan(np.abs(phase_margin)),
         crossover * closed.scale,
         _without_nan((phase % TURN) / unity.omega).min(axis=-1) / closed.scale,
-        2.0 / balanced_peak(closed),
-        sensitivity_peak(closed),
+        2.0 / peak.balanced,
+        peak.sensitivity,
     )
     stable = _stable(closed, unity)
     return Margins(*(_where_stable(v, stable).reshape(*loop.gain.shape, *v.shape[1:]) for v in values))

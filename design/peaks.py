@@ -2,81 +2,88 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from design.crossovers import positive_roots
 from design.delayed import search_grid, turned_numerator
 from design.feedback import ClosedLoop, complementary
-from design.polynomials import derivative, evaluate, product, squared_magnitude, total
-from model.arrays import ComplexArray, FloatArray
+from design.polynomials import evaluate, squared_magnitude, taylor
+from model.arrays import FloatArray, GridArrays
 
 #: A peak is proved to be the largest to within this part of its square.
 RESOLUTION = 1e-8
+#: Where the search begins besides the poles: squares of frequencies over the loop's scale, 0 included.
+SAMPLES = np.concatenate([[0.0], np.geomspace(1e-3, 4.0, 24) ** 2])
 
 
-def sensitivity_peak(loop: ClosedLoop) -> FloatArray:
-    """``max |1 + L|^-1`` over the frequencies (N,); at least 1, because L vanishes at infinity."""
-    top = loop.transfer.denominator
-    omega = _delayed_peak(loop, opposite=False) if loop.delayed else _peak(loop, top)
-    return np.maximum(np.abs(1.0 - _complementary_at(loop, omega)), 1.0)
+@dataclass(frozen=True, eq=False)
+class Peaks(GridArrays):
+    """Peaks over all frequencies, (N,), each at least 1 because L vanishes at infinity.
+
+    Attributes
+    ----------
+    sensitivity : ``max |1 + L|^-1``
+    balanced : ``max |S - T| = max |1 - L| / |1 + L|``
+    """
+
+    sensitivity: FloatArray
+    balanced: FloatArray
 
 
-def balanced_peak(loop: ClosedLoop) -> FloatArray:
-    """``max |S - T| = max |1 - L| / |1 + L|`` over the frequencies (N,), at least 1."""
-    top = loop.transfer.denominator - loop.transfer.numerator
-    omega = _delayed_peak(loop, opposite=True) if loop.delayed else _peak(loop, top)
-    return np.maximum(np.abs(1.0 - 2.0 * _complementary_at(loop, omega)), 1.0)
+def peaks(loop: ClosedLoop) -> Peaks:
+    """Peaks of the closed loop's sensitivity functions; meaningless where it is not stable."""
+    N = loop.scale.size
+    if loop.delayed:
+        omega = np.concatenate([_delayed_peak(loop, opposite) for opposite in (False, True)])
+    else:
+        omega = _peak(loop)
+    T, _ = complementary(loop, np.arange(2 * N) % N, omega, loop.delayed)
+    sensitivity, balanced = np.abs(1.0 - T[:N]), np.abs(1.0 - 2.0 * T[N:])
+    return Peaks(np.maximum(sensitivity, 1.0), np.maximum(balanced, 1.0))
 
 
-def _complementary_at(loop: ClosedLoop, omega: FloatArray) -> ComplexArray:
-    return complementary(loop, np.arange(omega.size), omega, loop.delayed)[0]
-
-
-def _peak(loop: ClosedLoop, top: FloatArray) -> FloatArray:
-    """Frequency (N,) where ``|top / characteristic|`` is largest, both monic.
+def _peak(loop: ClosedLoop) -> FloatArray:
+    """Frequencies (2N,) where S, and where S - T, are largest: ratios of two monic polynomials each.
 
     From the best of a few frequencies near the closed loop's poles, Newton on the derivative; then the
-    proof: the roots of ``|top|^2 - level |characteristic|^2`` bound the frequencies that lie above the level,
-    if there are any, and the search goes on from their midpoints (Bruinsma and Steinbuch 1990).
+    proof: the roots of ``|top|^2 - level |bottom|^2`` bound the frequencies that lie above the level, if
+    there are any, and the search goes on from their midpoints (Bruinsma and Steinbuch 1990).
     """
-    P, Q = squared_magnitude(top), squared_magnitude(loop.characteristic)
-    zero = np.zeros((P.shape[0], 1))
-    start = np.concatenate([zero, loop.poles.imag**2, np.abs(loop.poles) ** 2], axis=-1)
-    x, level = _best(P, Q, start)
+    ratio, N = loop.transfer, loop.scale.size
+    tops = np.concatenate([ratio.denominator, ratio.denominator - ratio.numerator])
+    P, Q = squared_magnitude(tops), np.tile(squared_magnitude(loop.characteristic), (2, 1))
+    start = np.concatenate([loop.poles.imag**2, np.abs(loop.poles) ** 2, np.tile(SAMPLES, (N, 1))], axis=-1)
+    x, level = _best(P, Q, np.tile(start, (2, 1)))
     level = np.maximum(level, 1.0)
     active = np.arange(x.size)
-    for _ in range(50):
-        p, q = P[active], Q[active]
-        edges = positive_roots(p - (level[active] * (1.0 + RESOLUTION))[:, None] * q)
-        edges = np.sort(edges, axis=-1)
+    while active.size:
+        above = level[active] * (1.0 + RESOLUTION)
+        edges = np.sort(positive_roots(P[active] - above[:, None] * Q[active]), axis=-1)
         middles = 0.5 * (edges[:, 1:] + edges[:, :-1])
-        found, height = _best(p, q, np.where(np.isnan(middles), 0.0, middles))
-        better = height > level[active] * (1.0 + RESOLUTION)
+        open_ = ~np.isnan(middles).all(axis=-1)
+        active, above, middles = active[open_], above[open_], middles[open_]
+        found, height = _best(P[active], Q[active], np.where(np.isnan(middles), 0.0, middles))
+        better = height > above
         active = active[better]
-        if active.size == 0:
-            break
         x[active], level[active] = found[better], height[better]
     return np.sqrt(x)
 
 
 def _best(P: FloatArray, Q: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where ``P/Q`` is largest (N,) among `start` (N, m), sharpened by Newton on ``P'Q - PQ'``, and its value."""
-    heights = _ratio(P, Q, start)
+    """Where ``P/Q`` is largest (N,) among `start` (N, m), sharpened by Newton on ``P'Q - PQ'``; its value."""
+    heights = evaluate(P, start) / evaluate(Q, start)
     best = np.argmax(heights, axis=-1)[:, None]
-    x, height = (np.take_along_axis(v, best, axis=-1) for v in (start, heights))
-    slope = total(product(derivative(P), Q), -product(P, derivative(Q)))
-    for _ in range(4):
+    start, height = (np.take_along_axis(v, best, axis=-1)[:, 0] for v in (start, heights))
+    both, x = np.stack([P, Q]), start
+    for _ in range(3):
+        (p, q), (dp, dq), (ddp, ddq) = taylor(both, x)
         with np.errstate(divide="ignore", invalid="ignore"):
-            trial = x - evaluate(slope, x) / evaluate(derivative(slope), x)
-        trial = np.where(np.isfinite(trial) & (trial > 0.0), trial, x).real
-        trial_height = _ratio(P, Q, trial)
-        x = np.where(trial_height > height, trial, x)
-        height = np.maximum(height, trial_height)
-    return x[:, 0], height[:, 0]
-
-
-def _ratio(P: FloatArray, Q: FloatArray, x: FloatArray) -> FloatArray:
-    return np.asarray(evaluate(P, x) / evaluate(Q, x)).real
+            x = x - (dp * q - p * dq) / (ddp * q - p * ddq)
+        x = np.where(np.isfinite(x) & (x > 0.0), x, start)
+    sharpened = np.divide(*evaluate(both, np.stack([x, x])[..., None])[..., 0])
+    return np.where(sharpened > height, x, start), np.maximum(sharpened, height)
 
 
 def _delayed_peak(loop: ClosedLoop, opposite: bool) -> FloatArray:

@@ -7,31 +7,15 @@ be zero: the degree may differ from point to point, and the arrays need not know
 
 from __future__ import annotations
 
+from functools import cache
+from typing import TypeVar
+
 import numpy as np
 
 from model.arrays import ComplexArray, FloatArray, IntArray
 
-
-def product(p: FloatArray, q: FloatArray) -> FloatArray:
-    """``p q``: (*G, a) and (*G, b) give (*G, a+b-1)."""
-    if p.shape[-1] < q.shape[-1]:
-        p, q = q, p
-    shape = np.broadcast_shapes(p.shape[:-1], q.shape[:-1])
-    result = np.zeros((*shape, p.shape[-1] + q.shape[-1] - 1))
-    for i in range(q.shape[-1]):
-        result[..., i : i + p.shape[-1]] += q[..., i : i + 1] * p
-    return result
-
-
-def total(p: FloatArray, q: FloatArray) -> FloatArray:
-    """``p + q`` for different lengths: the constant terms are aligned."""
-    if p.shape[-1] < q.shape[-1]:
-        p, q = q, p
-    shape = np.broadcast_shapes(p.shape[:-1], q.shape[:-1])
-    result = np.zeros((*shape, p.shape[-1]))
-    result[...] = p
-    result[..., p.shape[-1] - q.shape[-1] :] += q
-    return result
+#: Real or complex points; what comes back is of the same kind.
+Points = TypeVar("Points", FloatArray, ComplexArray)
 
 
 def derivative(p: FloatArray) -> FloatArray:
@@ -39,27 +23,29 @@ def derivative(p: FloatArray) -> FloatArray:
     return p[..., :-1] * np.arange(p.shape[-1] - 1, 0, -1)
 
 
-def evaluate(p: FloatArray, s: ComplexArray | FloatArray) -> ComplexArray | FloatArray:
+def evaluate(p: FloatArray, s: Points) -> Points:
     """Value of (*G, n+1) at (*G, m) points, (*G, m), by Horner's rule; real for real `s`."""
     result = np.zeros_like(s)
-    for i in range(p.shape[-1]):
-        result = result * s + p[..., i : i + 1]
+    result += p[..., :1]
+    for i in range(1, p.shape[-1]):
+        result *= s
+        result += p[..., i : i + 1]
     return result
+
+
+def taylor(p: FloatArray, x: FloatArray) -> FloatArray:
+    """Value and first two derivatives of (*G, n+1) at one real point each (*G,), stacked: (3, *G)."""
+    value, slope, bend = (np.zeros(p.shape[:-1]) for _ in range(3))
+    for i in range(p.shape[-1]):
+        bend = bend * x + slope
+        slope = slope * x + value
+        value = value * x + p[..., i]
+    return np.stack([value, slope, 2.0 * bend])
 
 
 def magnitude_bound(p: FloatArray, s: ComplexArray | FloatArray) -> FloatArray:
     """Sum of the magnitudes of the terms of `p` at `s`: what its value is small or large against."""
-    return np.asarray(evaluate(np.abs(p), np.abs(s)))
-
-
-def even_part(p: FloatArray) -> FloatArray:
-    """E of ``p(jw) = E(x) + j w O(x)``, ``x = w^2``, as a polynomial in x."""
-    return _alternating(p[..., ::-1][..., 0::2])
-
-
-def odd_part(p: FloatArray) -> FloatArray:
-    """O of ``p(jw) = E(x) + j w O(x)``, ``x = w^2``, as a polynomial in x."""
-    return _alternating(p[..., ::-1][..., 1::2])
+    return evaluate(np.abs(p), np.abs(s))
 
 
 def squared_magnitude(p: FloatArray) -> FloatArray:
@@ -68,27 +54,43 @@ def squared_magnitude(p: FloatArray) -> FloatArray:
 
 
 def real_cross(p: FloatArray, q: FloatArray) -> FloatArray:
-    """``Re(p(jw) conj q(jw))`` as a polynomial in ``x = w^2``; p and q (*G, n+1) give (*G, n+1)."""
-    even = product(even_part(p), even_part(q))
-    odd = product(odd_part(p), odd_part(q))
-    shifted = np.concatenate([odd, np.zeros((*odd.shape[:-1], 1))], axis=-1)
-    return total(even, shifted)
+    """``Re(p(jw) conj q(jw))`` as a polynomial in ``x = w^2``: two (*G, n+1) give (*G, n+1)."""
+    return _bilinear(p, q, _cross_tables(p.shape[-1])[0])
 
 
 def imaginary_cross(p: FloatArray, q: FloatArray) -> FloatArray:
-    """``Im(p(jw) conj q(jw)) / w`` as a polynomial in ``x = w^2``."""
-    return total(product(odd_part(p), even_part(q)), -product(even_part(p), odd_part(q)))
+    """``Im(p(jw) conj q(jw)) / w`` as a polynomial in ``x = w^2``: two (*G, n+1) give (*G, n)."""
+    return _bilinear(p, q, _cross_tables(p.shape[-1])[1])
 
 
-def _alternating(ascending: FloatArray) -> FloatArray:
-    signs = np.where(np.arange(ascending.shape[-1]) % 2 == 0, 1.0, -1.0)
-    return (ascending * signs)[..., ::-1]
+def _bilinear(p: FloatArray, q: FloatArray, table: FloatArray) -> FloatArray:
+    products = p[..., :, None] * q[..., None, :]
+    return np.asarray(products.reshape(*products.shape[:-2], -1) @ table)
+
+
+@cache
+def _cross_tables(length: int) -> tuple[FloatArray, FloatArray]:
+    """Where the product of two coefficients goes: (length^2, length) and (length^2, length-1).
+
+    The terms ``(jw)^a`` and ``conj (jw)^b`` make ``j^(a-b) w^(a+b)``: real for even ``a - b``, with the sign
+    ``(-1)^((a-b)/2)`` and the power ``x^((a+b)/2)``; else j times ``(-1)^((a-b-1)/2) w x^((a+b-1)/2)``.
+    """
+    power = np.arange(length)[::-1]
+    a, b = (m.ravel() for m in np.meshgrid(power, power, indexing="ij"))
+    odd = (a - b) % 2
+    sign = 1.0 - 2.0 * (((a - b - odd) // 2) % 2)
+    place = (a + b - odd) // 2
+    real, imaginary = np.zeros((a.size, length)), np.zeros((a.size, length))
+    rows = np.arange(a.size)
+    real[rows, length - 1 - place] = sign * (1 - odd)
+    imaginary[rows, length - 1 - place] = sign * odd
+    return real, imaginary[:, 1:]
 
 
 def leading_zeros(p: FloatArray) -> IntArray:
     """How many leading coefficients are exactly zero, (*G,); all of them for the zero polynomial."""
     nonzero = p != 0.0
-    return np.where(nonzero.any(axis=-1), nonzero.argmax(axis=-1), p.shape[-1])
+    return np.asarray(np.where(nonzero.any(axis=-1), nonzero.argmax(axis=-1), p.shape[-1]))
 
 
 def roots(p: FloatArray) -> ComplexArray:
@@ -104,11 +106,10 @@ def roots(p: FloatArray) -> ComplexArray:
     result = np.full((rows.shape[0], n), complex(np.nan, np.nan))
     head, tail = leading_zeros(rows), leading_zeros(rows[:, ::-1])
     kinds = np.where(head <= n, head * (n + 1) + tail, -1)
-    for kind in np.unique(kinds[kinds >= 0]):
-        h, t = divmod(int(kind), n + 1)
+    for kind in set(kinds.tolist()) - {-1}:
+        h, t = divmod(kind, n + 1)
         members = kinds == kind
-        found = _nonzero_roots(rows[members, h : n + 1 - t])
-        result[members, : n - h - t] = found
+        result[members, : n - h - t] = _nonzero_roots(rows[members, h : n + 1 - t])
         result[members, n - h - t : n - h] = 0.0
     return result.reshape(*p.shape[:-1], n)
 
@@ -123,7 +124,8 @@ def _nonzero_roots(p: FloatArray) -> ComplexArray:
     companion = np.zeros((p.shape[0], m, m))
     companion[:, np.arange(1, m), np.arange(m - 1)] = 1.0
     companion[:, 0, :] = -scaled[:, 1:]
-    return np.linalg.eigvals(companion).astype(complex) * scale[:, None]
+    values: ComplexArray = np.linalg.eigvals(companion).astype(complex)
+    return values * scale[:, None]
 
 
 def power_of_two_scale(p: FloatArray) -> FloatArray:

@@ -33,7 +33,6 @@ class Response(GridArrays):
     time : (*G, T) sample times, evenly spaced from 0 [s]; a view that all points share
     states : (*G, T, n) deviations from trim
     outputs : (*G, T, o) totals, trim values included; the first sample is the value at t = 0+
-    trim : (*G, o) outputs before the step
     reference : (*G, p) size of the step of each reference [rad]
     generator : (*G, n+1, n+1) M of ``z' = M z``, ``z = [x, 1]`` [1/s]
     rows : (*G, o, n+1) R of ``y = R z``
@@ -44,24 +43,22 @@ class Response(GridArrays):
     time: FloatArray
     states: FloatArray
     outputs: FloatArray
-    trim: FloatArray
     reference: FloatArray
     generator: FloatArray
     rows: FloatArray
     names: tuple[str, ...]
     duration: float
 
-    def row(self, name: str) -> FloatArray:
-        """(*G, n+1) row of `rows` that gives the named output; ValueError when there is none."""
+    def index(self, name: str) -> int:
+        """Index of the named output; ValueError when there is none."""
         if name not in self.names:
             raise ValueError(f"the loop has no output {name!r}; it has {', '.join(self.names)}")
-        return self.rows[..., self.names.index(name), :]
+        return self.names.index(name)
 
     @cached_property
     def poles(self) -> ComplexArray:
         """(*G, n) poles of the closed loop [1/s]."""
-        poles: ComplexArray = np.linalg.eigvals(self.generator[..., :-1, :-1])
-        return poles
+        return np.linalg.eigvals(self.generator[..., :-1, :-1]).astype(np.complex128)
 
     @cached_property
     def final_outputs(self) -> FloatArray:
@@ -108,7 +105,6 @@ def step_response(loop: Loop, reference: FloatArray, duration: float, samples: i
         time=time,
         states=z[..., :n],
         outputs=outputs,
-        trim=loop.offset,
         reference=step,
         generator=generator,
         rows=rows,

@@ -1,48 +1,53 @@
-"""Continuous Riccati equations, batched over the grid, each with a certificate.
+"""Continuous Riccati equations, batched over the grid, each solution with a certificate.
 
-Balanced Hamiltonian eigenvectors, one Newton step, certificate; the points that fail it go through scipy
-one by one and face the same certificate; what still fails carries no gain.
+Balanced Hamiltonian eigenvectors, one Newton step, certificate. The points that fail it get a second opinion
+from scipy, one by one; what still fails carries no gain.
 
 The certificate
 ---------------
-A small residual and a stable closed loop are not enough: with an unobservable mode on the axis rounding
-splits the double eigenvalue of the Hamiltonian, and a solution that does not exist passes both. So each
-point also shows that a stabilising solution exists next to the computed one (Newton-Kantorovich, in the
-order of symmetric matrices). Let ``Ac = A - GX``, let the diagonal W bound the residual with its rounding
-error, ``-W <= R(X) <= W``, and let P solve ``Ac'P + P Ac = -W``. Then the Newton map sends the set
-``-2P <= D <= 2P`` into itself, and P stays a Lyapunov function on all of it, when ::
+A small residual and a stable closed loop are not enough: where a mode on the axis is not observed, rounding
+splits the double eigenvalue of the Hamiltonian, and a solution that does not exist passes both tests. So a
+certified point also shows that a stabilising solution exists, in one of two ways.
+
+*Proof* (Newton-Kantorovich, in the order of symmetric matrices). Let ``Ac = A - GX``, let the diagonal W bound
+the residual with its rounding error, ``-W <= R(X) <= W``, and let P solve ``Ac'P + P Ac = -W``. When ::
 
     doubt = 4 trace(W^-1 P) trace(G P) < 1
 
-so the exact stabilising solution lies within 2P of X. `doubt` is also about the relative change which the
-error can make in the damping of a closed-loop pole; `MAX_DOUBT` asks for much less than 1.
+the Newton map sends the set ``-2P <= D <= 2P`` into itself, and P stays a Lyapunov function on all of it: the
+exact stabilising solution lies within 2P of X. `doubt` is about the largest relative error of a closed-loop
+pole's damping, so it has to be much smaller than 1.
+
+*Two witnesses.* With weights many decades apart the proof is too pessimistic. Then eigenvectors and scipy, two
+algorithms with different rounding, must agree on the gain and on the damping of every pole, and the rank tests
+of `design.solvability` must be passed with room to spare.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 import scipy.linalg
 
-from design.hamiltonian import RiccatiEquation, balanced_equation, solve_or_nan, stabilising_candidate
+from design.hamiltonian import solve_or_nan, stabilising_candidate
+from design.regulator import RegulatorProblem, RiccatiEquation, finite, regulator_problem
+from design.solvability import problem_solvability
 from model.arrays import BoolArray, FloatArray, GridArrays, IntArray, ObjectArray
-
-Solver = Literal["eigenvectors", "scipy", "none"]
 
 #: Largest relative residual, in balanced coordinates, of a certified solution.
 MAX_RESIDUAL = 1e-10
-#: Largest `doubt` of a certified solution (see above; 1 would still prove existence).
-MAX_DOUBT = 1e-3
+#: Largest doubt of a proved solution; 1 would still prove existence.
+MAX_DOUBT = 1e-6
 #: X may be singular (a stable mode that costs nothing); more negative than this, relative, it is not.
 NEGATIVE = 1e-10
-#: Rounding of the residual, in units of the sum of the magnitudes of its terms.
+#: Rounding error of a sum of products, in units of the sum of their magnitudes.
 ROUNDING = 16 * float(np.finfo(float).eps)
-FLOOR = 1e-6
-#: Weights less symmetric than this, relative to their largest entry, are refused.
-ASYMMETRY = 1e-9
+#: Two witnesses agree: relative difference of their gains, and of the damping of their closed-loop poles.
+SAME_GAIN, SAME_DAMPING = 1e-7, 1e-4
+#: Distance from losing rank at which two witnesses are believed: above the square root of rounding error.
+CLEARLY_SOLVABLE = 2e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,24 +73,19 @@ class RiccatiSolution(GridArrays):
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem(GridArrays):
-    """The regulator problem over N points, cross term kept; `posed` marks the points worth solving."""
-
-    A: FloatArray
-    B: FloatArray
-    S: FloatArray
-    cross: FloatArray
-    posed: BoolArray
-    equation: RiccatiEquation
-
-
-@dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A solution of the scaled equation after a Newton step, and the doubt about it (N,)."""
+    """A candidate over N points, after a Newton step.
+
+    X : (N, n, n) of the scaled equation; K : (N, m, n) in the states' units; poles : (N, n) of ``A - B K``
+    sound : stable, positive semidefinite, small residual; proved : sound, and with little doubt
+    """
 
     X: FloatArray
+    K: FloatArray
+    poles: FloatArray
     residual: FloatArray
-    doubt: FloatArray
+    sound: BoolArray
+    proved: BoolArray
 
 
 def solve_riccati(
@@ -94,8 +94,8 @@ def solve_riccati(
     """Stabilising solution of ``A'X + XA - (XB + N) R^-1 (B'X + N') + Q = 0`` at every point.
 
     It minimises ``int( x'Qx + u'Ru + 2x'Nu ) dt`` over ``u = -K x`` when ``R > 0`` and ``Q - N R^-1 N' >= 0``
-    (`design.weights` checks that and says why). A point without a certified solution (no stabilising one, too
-    ill-conditioned, data not finite) has nan in X and K; nothing is raised for it.
+    (`design.weights` checks that and says why not). A point without a certified solution (no stabilising one,
+    too ill-conditioned, data not finite) has nan in X and K; nothing is raised for it.
 
     Parameters
     ----------
@@ -106,140 +106,59 @@ def solve_riccati(
     ------
     ValueError : shapes that do not belong together
     """
-    grid = _check_shapes(A, B, Q, R, N)
-    with np.errstate(all="ignore"):
-        problem = _problem(grid, A, B, Q, R, N)
-        solution = _certify(problem, stabilising_candidate(problem.equation), "eigenvectors")
-        failed = np.flatnonzero(problem.posed & ~solution.certified)
-        if failed.size:
-            solution = _replaced(solution, failed, _second_opinion(problem.take(failed)))
-    return RiccatiSolution(
-        X=solution.X.reshape(*grid, *solution.X.shape[1:]),
-        K=solution.K.reshape(*grid, *solution.K.shape[1:]),
-        residual=solution.residual.reshape(grid),
-        largest_real_part=solution.largest_real_part.reshape(grid),
-        certified=solution.certified.reshape(grid),
-        solver=solution.solver.reshape(grid),
-    )
-
-
-def _check_shapes(
-    A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, N: FloatArray | None
-) -> tuple[int, ...]:
-    n, m = B.shape[-2:]
     grid = A.shape[:-2]
-    wanted = {"A": (A, (n, n)), "Q": (Q, (n, n)), "R": (R, (m, m))}
-    if N is not None:
-        wanted["N"] = (N, (n, m))
-    for name, (matrix, shape) in wanted.items():
-        if matrix.shape[-2:] != shape or matrix.shape[:-2] not in ((), grid):
-            raise ValueError(f"{name} has shape {matrix.shape}: expected {shape} at each point of {grid}")
-    if B.shape[:-2] != grid:
-        raise ValueError(f"A and B have different grids: {grid} and {B.shape[:-2]}")
-    return grid
-
-
-def _problem(
-    grid: tuple[int, ...],
-    A: FloatArray,
-    B: FloatArray,
-    Q: FloatArray,
-    R: FloatArray,
-    N: FloatArray | None,
-) -> _Problem:
-    """Cross term removed, balanced, grid flattened; points that are not posed hold a harmless equation."""
-    n, m = B.shape[-2:]
-    A, B = A.reshape(-1, n, n), B.reshape(-1, n, m)
-    S, posed = _inverse_root(R)
-    S, posed = S.reshape(-1, m, m), posed.reshape(-1)
-    cross = np.zeros((1, m, n))
-    Q = Q.reshape(-1, n, n)
-    posed = posed & _symmetric(Q)
-    A_reduced, F = A, B @ S
-    if N is not None:
-        half = S.mT @ N.reshape(-1, n, m).mT
-        cross = S @ half
-        A_reduced, Q = A - B @ cross, Q - half.mT @ half
-        posed = posed & _finite(Q)
-    posed = posed & _finite(A_reduced) & _finite(F)
-    if not np.all(posed):
-        A_reduced = np.where(posed[:, None, None], A_reduced, -np.eye(n))
-        F = np.where(posed[:, None, None], F, 0.0)
-        Q = np.where(posed[:, None, None], Q, np.eye(n))
-    Q = np.broadcast_to(Q, A.shape)
-    points = (len(A), m)
-    return _Problem(
-        A=A,
-        B=B,
-        S=np.broadcast_to(S, (*points, m)),
-        cross=np.broadcast_to(cross, (*points, n)),
-        posed=posed,
-        equation=balanced_equation(A_reduced, F, 0.5 * (Q + Q.mT)),
+    with np.errstate(all="ignore"):
+        problem = regulator_problem(A, B, Q, R, N)
+        first = _judged(problem, stabilising_candidate(problem.equation))
+        certified = first.proved
+        solver = np.where(certified, "eigenvectors", "none").astype(object)
+        doubtful = np.flatnonzero(problem.posed & ~certified)
+        if doubtful.size:
+            first, solver = _second_opinion(problem, first, solver, doubtful)
+            certified = solver != "none"
+        X, K, residual = problem.equation.solution_in_states(first.X), first.K, first.residual
+    if not certified.all():
+        X[~certified], K[~certified] = np.nan, np.nan
+        residual = np.where(problem.posed, residual, np.nan)
+    return RiccatiSolution(
+        X=X.reshape(*grid, *X.shape[1:]),
+        K=K.reshape(*grid, *K.shape[1:]),
+        residual=residual.reshape(grid),
+        largest_real_part=first.poles.max(axis=-1).reshape(grid),
+        certified=np.asarray(certified, dtype=bool).reshape(grid),
+        solver=solver.reshape(grid),
     )
 
 
-def _inverse_root(R: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """S with ``R^-1 = S S'``, and where R is finite, symmetric and positive definite (S is 0 elsewhere)."""
-    posed = _symmetric(R)
-    diagonal = np.diagonal(R, axis1=-2, axis2=-1)
-    posed = posed & np.all(diagonal > 0, axis=-1)
-    # Inputs in mixed units: positive definiteness is judged with a unit diagonal.
-    unit = 1.0 / np.sqrt(np.where(posed[..., None], diagonal, 1.0))
-    scaled = (
-        np.where(posed[..., None, None], R, np.eye(R.shape[-1])) * unit[..., :, None] * unit[..., None, :]
-    )
-    values, vectors = np.linalg.eigh(scaled)
-    posed = posed & (values[..., 0] > R.shape[-1] * np.finfo(float).eps)
-    values = np.where(posed[..., None], values, 1.0)
-    S = unit[..., :, None] * vectors / np.sqrt(values)[..., None, :]
-    return np.where(posed[..., None, None], S, 0.0), posed
-
-
-def _finite(matrix: FloatArray) -> BoolArray:
-    return np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
-
-
-def _symmetric(matrix: FloatArray) -> BoolArray:
-    """Finite and symmetric, point by point."""
-    size = np.max(np.abs(matrix), axis=(-2, -1))
-    return np.asarray(np.max(np.abs(matrix - matrix.mT), axis=(-2, -1)) <= ASYMMETRY * size) & _finite(matrix)
-
-
-def _certify(problem: _Problem, X: FloatArray, solver: Solver) -> RiccatiSolution:
-    """One Newton step from X, gains, and the certificate on what comes out."""
-    candidate = _newton(problem.equation, X)
-    X = problem.equation.solution_in_states(candidate.X)
-    K = problem.S @ problem.equation.feedback_in_states(candidate.X) + problem.cross
+def _judged(problem: RegulatorProblem, X: FloatArray) -> _Candidate:
+    """One Newton step from X, the gain, and every test on what comes out."""
+    equation = problem.equation
+    X, residual, doubt = _newton(equation, X)
+    K = problem.S @ equation.feedback_in_states(X) + problem.cross
     closed = problem.A - problem.B @ K
-    usable = problem.posed & _finite(closed) & _finite(X)
+    usable = problem.posed & finite(closed) & finite(equation.solution_in_states(X))
     if not usable.all():
         closed[~usable] = 0.0
-    largest = np.where(usable, np.linalg.eigvals(closed).real.max(axis=-1), np.nan)
-    certified = (
+    poles = np.sort(np.linalg.eigvals(closed).real, axis=-1)
+    poles[~usable] = np.nan
+    rate = np.ldexp(_norm(equation.A - equation.G @ X), equation.time_exponent)
+    spectrum = np.linalg.eigvalsh(np.where(usable[:, None, None], X, 0.0))
+    sound = (
         usable
-        & (candidate.residual <= MAX_RESIDUAL)
-        & (candidate.doubt <= MAX_DOUBT)
-        & (largest < 0)
-        & _semidefinite(np.where(usable[:, None, None], candidate.X, 0.0))
+        & (residual <= MAX_RESIDUAL)
+        & (poles[:, -1] < -ROUNDING * rate)
+        & (spectrum[:, 0] >= -NEGATIVE * np.abs(spectrum[:, -1]))
     )
-    rejected = ~certified[:, None, None]
-    return RiccatiSolution(
-        X=np.where(rejected, np.nan, X),
-        K=np.where(rejected, np.nan, K),
-        residual=np.where(problem.posed, candidate.residual, np.nan),
-        largest_real_part=largest,
-        certified=certified,
-        solver=np.where(certified, solver, "none").astype(object),
-    )
+    return _Candidate(X, K, poles, residual, sound, sound & (doubt <= MAX_DOUBT))
 
 
-def _semidefinite(X: FloatArray) -> BoolArray:
-    spectrum = np.linalg.eigvalsh(X)
-    return np.asarray(spectrum[:, 0] >= -NEGATIVE * np.abs(spectrum[:, -1]))
+def _newton(equation: RiccatiEquation, X: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """One Newton step, kept where it lowers the residual.
 
-
-def _newton(equation: RiccatiEquation, X: FloatArray) -> _Candidate:
-    """One Newton step, kept where it lowers the residual, and the doubt about the solution."""
+    Returns
+    -------
+    X (N, n, n), its relative residual (N,), and the doubt (N,) about the solution, see the module
+    """
     n = X.shape[-1]
     error, residual = _residual(equation, X)
     bound = _residual_bound(equation, X, error)
@@ -249,28 +168,23 @@ def _newton(equation: RiccatiEquation, X: FloatArray) -> _Candidate:
     right = np.zeros((len(X), len(rows), 2))
     right[:, :, 0] = error[:, rows, columns]
     right[:, rows == columns, 1] = -bound
-    step = solve_or_nan(operator, right)
-    D, P = step[:, unpack, 0], step[:, unpack, 1]
+    step = solve_or_nan(operator, right)[:, unpack]
+    D, P = step[..., 0], step[..., 1]
     spread = np.sum(np.diagonal(P, axis1=-2, axis2=-1) / bound, axis=-1)
     doubt = 4.0 * spread * np.sum(equation.G * P, axis=(-2, -1))
-    # Only a Lyapunov function proves anything: positive definite when the closed loop is stable.
-    definite = np.all(np.diagonal(P, axis1=-2, axis2=-1) > 0, axis=-1)
-    _, better = _residual(equation, X - D)
-    keep = ~(better < residual)
-    return _Candidate(
-        X=np.where(keep[:, None, None], X, X - D),
-        residual=np.where(keep, residual, better),
-        doubt=np.where(definite, doubt, np.inf),
-    )
+    # P is a Lyapunov function only when it is positive definite, as it is when Ac is stable.
+    doubt[~np.all(np.diagonal(P, axis1=-2, axis2=-1) > 0, axis=-1)] = np.inf
+    _, lower = _residual(equation, X - D)
+    better = lower < residual
+    return np.where(better[:, None, None], X - D, X), np.where(better, lower, residual), doubt
 
 
 def _residual(equation: RiccatiEquation, X: FloatArray) -> tuple[FloatArray, FloatArray]:
     """``A'X + XA - XGX + Q`` (N, n, n), and its norm over that of its terms (N,); 0 / 0 counts as 0."""
     half = equation.A.mT @ X
-    linear = half + half.mT
     root = X @ equation.F
     quadratic = root @ root.mT
-    error = linear - quadratic + equation.Q
+    error = half + half.mT - quadratic + equation.Q
     size = 2.0 * _norm(half) + _norm(quadratic) + _norm(equation.Q)
     norm = _norm(error)
     return error, np.where(norm == 0.0, 0.0, norm / size)
@@ -282,19 +196,15 @@ def _norm(matrix: FloatArray) -> FloatArray:
 
 
 def _residual_bound(equation: RiccatiEquation, X: FloatArray, error: FloatArray) -> FloatArray:
-    """Diagonal of W (N, n): ``-W <= E <= W`` for any symmetric E within the residual and its rounding error.
-
-    Row sums of ``|E_ij| d_j / d_i`` dominate for every positive d; entries that are graded like
-    ``sqrt(E_ii E_jj)`` ask for ``d_i = E_ii^-1/2``.
-    """
+    """Diagonal of W (N, n), positive: row sums of the residual and of its rounding error."""
     size = np.abs(X)
     half = np.abs(equation.A).mT @ size
     root = size @ np.abs(equation.F)
     terms = half + half.mT + root @ root.mT + np.abs(equation.Q)
-    bound = np.abs(error) + ROUNDING * terms
-    diagonal = np.sqrt(np.diagonal(bound, axis1=-2, axis2=-1))
-    diagonal = diagonal + FLOOR * np.max(diagonal, axis=1, keepdims=True)
-    return np.asarray(diagonal * np.sum(bound / diagonal[:, None, :], axis=2))
+    bound = np.sum(np.abs(error) + ROUNDING * terms, axis=2)
+    # A state without any terms still needs a positive weight for P to be a Lyapunov function.
+    floor = np.finfo(float).eps * np.max(bound, axis=1, keepdims=True) + np.finfo(float).tiny
+    return np.asarray(bound + floor)
 
 
 @lru_cache(maxsize=16)
@@ -317,31 +227,45 @@ def _symmetric_index(n: int) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
     return rows, columns, unpack, lyapunov.reshape(n * n, -1)
 
 
-def _second_opinion(problem: _Problem) -> RiccatiSolution:
-    """The points which eigenvectors could not certify: scipy one by one, then two Newton steps."""
+def _second_opinion(
+    problem: RegulatorProblem, first: _Candidate, solver: ObjectArray, doubtful: IntArray
+) -> tuple[_Candidate, ObjectArray]:
+    """Candidates and solvers with the doubtful points judged again: another Newton step, and scipy."""
+    problem = problem.take(doubtful)
     equation = problem.equation
-    X = np.stack([_scipy_candidate(equation.take(i)) for i in range(len(equation.A))])
-    return _certify(problem, _newton(equation, X).X, "scipy")
+    eigen = _judged(problem, first.X[doubtful])
+    scipy_X = np.stack([_scipy_candidate(equation.take(i)) for i in range(len(doubtful))])
+    other = _judged(problem, _newton(equation, scipy_X)[0])
+    by_scipy = other.proved & ~eigen.proved
+    believed = eigen.proved | by_scipy | _agree(problem, eigen, other)
+    solver[doubtful[believed]] = "eigenvectors"
+    solver[doubtful[by_scipy]] = "scipy"
+    values = {}
+    for name in ("X", "K", "poles", "residual", "sound", "proved"):
+        values[name] = getattr(first, name).copy()
+        mine, theirs = getattr(eigen, name), getattr(other, name)
+        values[name][doubtful] = np.where(by_scipy.reshape(-1, *[1] * (mine.ndim - 1)), theirs, mine)
+    return _Candidate(**values), solver
+
+
+def _agree(problem: RegulatorProblem, one: _Candidate, other: _Candidate) -> BoolArray:
+    """Two sound candidates with the same gain and the same damping, of a clearly solvable problem."""
+    F = problem.equation.F
+    gain, difference = _norm(F.mT @ one.X), _norm(F.mT @ (one.X - other.X))
+    damping = np.max(np.abs(one.poles - other.poles) / np.abs(one.poles), axis=-1)
+    same = one.sound & other.sound & (difference <= SAME_GAIN * gain) & (damping <= SAME_DAMPING)
+    if not same.any():
+        return same
+    solvable = problem_solvability(problem)
+    distance = np.minimum(solvable.control_distance, solvable.observation_distance)
+    return np.asarray(same & (distance >= CLEARLY_SOLVABLE))
 
 
 def _scipy_candidate(equation: RiccatiEquation) -> FloatArray:
     """scipy's solution at one point (n, n), symmetric; nan where it raises."""
+    inputs = equation.F.shape[-1]
     try:
-        X = scipy.linalg.solve_continuous_are(
-            equation.A, equation.F, equation.Q, np.eye(equation.F.shape[-1])
-        )
+        X = scipy.linalg.solve_continuous_are(equation.A, equation.F, equation.Q, np.eye(inputs))
     except (np.linalg.LinAlgError, ValueError):
         return np.full(equation.A.shape, np.nan)
     return np.asarray(0.5 * (X + X.T))
-
-
-def _replaced(solution: RiccatiSolution, where: IntArray, by: RiccatiSolution) -> RiccatiSolution:
-    """The same solutions with those at the flat indices `where` replaced if `by` is certified there."""
-    better = where[by.certified]
-    new = by.take(by.certified)
-    values = {}
-    for name in ("X", "K", "residual", "largest_real_part", "certified", "solver"):
-        array = np.array(getattr(solution, name))
-        array[better] = getattr(new, name)
-        values[name] = array
-    return RiccatiSolution(**values)

@@ -39,7 +39,8 @@ class StepMetrics(GridArrays):
     bandwidth : frequency where the transfer from the reference is 3 dB below its DC gain [rad/s]
 
     Where the output does not settle (an unstable loop) all of them are nan; where it settles to where it
-    began, those that are fractions of the change are.
+    began, those that are fractions of the change are; of an output without a reference the error and the
+    bandwidth are.
     """
 
     rise_time: FloatArray
@@ -53,27 +54,26 @@ class StepMetrics(GridArrays):
 
 
 def step_metrics(
-    loop: Loop, response: Response, output: str = "da", reference: str = "r_a"
+    loop: Loop, response: Response, output: str = "da", reference: FloatArray | None = None
 ) -> StepMetrics:
-    """Metrics of an output that is to follow a reference.
+    """Metrics of an output that is to follow its reference (``da`` follows ``r_a``, ``dt`` follows ``r_t``).
 
     Parameters
     ----------
     loop : closed loops over the grid
     response : their response (``design.response.step_response``)
-    output, reference : names of the output and of the reference that it is to follow
+    output : name of the output
+    reference : (p,) or (*G, p) wanted changes [rad]; the steps of the response when left out
 
     Raises
     ------
-    ValueError : the loop has no such output or reference
+    ValueError : the loop has no such output
     """
-    if reference not in loop.references:
-        raise ValueError(f"the loop has no reference {reference!r}; it has {', '.join(loop.references) or 'none'}")
-    row = response.row(output)
-    column, o = loop.references.index(reference), response.names.index(output)
-    final, trim = response.final_outputs[..., o], response.trim[..., o]
+    o = response.index(output)
+    wanted = response.reference if reference is None else np.asarray(reference, dtype=float)
+    final, trim = response.final_outputs[..., o], loop.offset[..., o]
     with np.errstate(over="ignore", invalid="ignore"):
-        signal = response.graded.signals(row[..., None, :])[..., 0, :, :]
+        signal = response.graded.signals(response.rows[..., o : o + 1, :])[..., 0, :, :]
         moved = signal - trim[..., None, None]
         size = np.max(np.abs(moved), axis=(-2, -1))
     exists = np.isfinite(size) & (np.abs(final - trim) > 1e-12 * size)
@@ -86,8 +86,8 @@ def step_metrics(
         undershoot=_spread(course.undershoot(), exists),
         peak_time=_spread(np.where(peak.value > 1.0 + _PEAK_RESOLUTION, peak.time, np.nan), exists),
         steady_state_value=np.asarray(final),
-        steady_state_error=np.asarray(response.reference[..., column] - (final - trim)),
-        bandwidth=_bandwidth(loop, response, o, column),
+        steady_state_error=_wanted(loop, output, wanted) - (final - trim),
+        bandwidth=_bandwidth(loop, response, output),
     )
 
 
@@ -98,10 +98,26 @@ def _spread(values: FloatArray, exists: BoolArray) -> FloatArray:
     return spread
 
 
-def _bandwidth(loop: Loop, response: Response, output: int, column: int) -> FloatArray:
-    """(*G,) bandwidth from one reference to one output."""
+def _reference_of(loop: Loop, output: str) -> int | None:
+    """Index of the reference that an output follows; None when the loop has none (a regulator)."""
+    name = "r_" + output.removeprefix("d")
+    return loop.references.index(name) if name in loop.references else None
+
+
+def _wanted(loop: Loop, output: str, reference: FloatArray) -> FloatArray:
+    """(*G,) wanted change of the output; nan when nothing is wanted of it."""
+    column = _reference_of(loop, output)
+    grid = loop.A.shape[:-2]
+    return np.full(grid, np.nan) if column is None else np.broadcast_to(reference[..., column], grid)
+
+
+def _bandwidth(loop: Loop, response: Response, output: str) -> FloatArray:
+    """(*G,) bandwidth from its reference to the output [rad/s]."""
+    column, o = _reference_of(loop, output), response.index(output)
+    if column is None:
+        return np.full(loop.A.shape[:-2], np.nan)
     A, b = loop.closed, loop.reference_input[..., column]
-    c, d = loop.closed_outputs[..., output, :], loop.reference_feedthrough[..., output, column]
+    c, d = loop.closed_outputs[..., o, :], loop.reference_feedthrough[..., o, column]
     generator = np.zeros_like(response.generator)
     generator[..., :-1, :-1], generator[..., :-1, -1] = A, b
     row = np.concatenate([c, d[..., None]], axis=-1)[..., None, :]

@@ -75,29 +75,20 @@ def transfer(A: FloatArray, b: FloatArray, c: FloatArray) -> Transfer:
     """
     n = A.shape[-1]
     identity = np.eye(n)
-    denominator, numerator = np.zeros((*A.shape[:-2], n + 1)), np.zeros((*A.shape[:-2], n + 1))
-    denominator[..., 0] = 1.0
-    adjugate = np.broadcast_to(identity, A.shape)
-    bound = adjugate
-    rounding = 8.0 * n * np.finfo(float).eps
+    matrices, columns, rows = (np.stack([m, np.abs(m)]) for m in (A, b[..., None], c[..., None, :]))
+    adjugate: FloatArray = np.broadcast_to(identity, matrices.shape)
+    signs = np.reshape([-1.0, 1.0], (2, *(1,) * (A.ndim - 2)))
+    denominator, numerator = np.zeros((2, *A.shape[:-2], n + 1)), np.zeros((2, *A.shape[:-2], n + 1))
+    denominator[0, ..., 0] = 1.0
     for k in range(1, n + 1):
-        numerator[..., k] = _significant(_form(c, adjugate, b), rounding * _form(np.abs(c), bound, np.abs(b)))
-        product, size = A @ adjugate, np.abs(A) @ bound
-        trace = np.trace(product, axis1=-2, axis2=-1) / k
-        largest = np.trace(size, axis1=-2, axis2=-1) / k
-        denominator[..., k] = -_significant(trace, rounding * largest)
+        numerator[..., k] = (rows @ adjugate @ columns)[..., 0, 0]
+        product = matrices @ adjugate
+        denominator[..., k] = signs * np.trace(product, axis1=-2, axis2=-1) / k
         adjugate = product + denominator[..., k, None, None] * identity
-        bound = size + largest[..., None, None] * identity
-    return Transfer(numerator, denominator)
-
-
-def _form(c: FloatArray, M: FloatArray, b: FloatArray) -> FloatArray:
-    """``c M b`` (*G,)."""
-    return np.asarray(((M * c[..., :, None]) * b[..., None, :]).sum(axis=(-2, -1)))
-
-
-def _significant(value: FloatArray, bound: FloatArray) -> FloatArray:
-    return np.where(np.abs(value) > bound, value, 0.0)
+    rounding = 8.0 * n * np.finfo(float).eps
+    return Transfer(
+        *(np.where(np.abs(value) > rounding * bound, value, 0.0) for value, bound in (numerator, denominator))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +112,14 @@ def response(A: FloatArray, b: FloatArray, c: FloatArray, s: ComplexArray) -> Re
     ------
     numpy.linalg.LinAlgError : a point of `s` is exactly an eigenvalue of `A`
     """
-    identity = np.eye(A.shape[-1])
-    resolvent = np.linalg.inv(s[..., None, None] * identity - A[..., None, :, :])
-    right = (resolvent @ b[..., None, :, None].astype(complex))[..., 0]
-    left = (c[..., None, None, :].astype(complex) @ resolvent)[..., 0, :]
+    n = A.shape[-1]
+    shifted = np.empty((*s.shape, n, n), dtype=complex)
+    shifted[...] = -A[..., None, :, :]
+    shifted[..., np.arange(n), np.arange(n)] += s[..., None]
+    resolvent = np.linalg.inv(shifted)
+    right = (resolvent * b[..., None, None, :]).sum(axis=-1)
+    left = (resolvent * c[..., None, :, None]).sum(axis=-2)
     value = (c[..., None, :] * right).sum(axis=-1)
     slope = -(left * right).sum(axis=-1)
-    curvature = 2.0 * (left * (resolvent @ right[..., None])[..., 0]).sum(axis=-1)
+    curvature = 2.0 * (left * (resolvent * right[..., None, :]).sum(axis=-1)).sum(axis=-1)
     return Response(value, slope, curvature)

@@ -30,7 +30,7 @@ def best_vertex(
     Returns
     -------
     (K, J) the best vertex: among those that meet all constraints the one with the largest aim; when none does,
-    the one whose largest violation is least.
+    the one whose largest violation is least; never a violation larger than at d = 0.
     """
     k, j = slope.shape
     eye = np.broadcast_to(np.eye(j), (k, j, j))
@@ -42,6 +42,8 @@ def best_vertex(
     independent = np.abs(np.linalg.det(N)) > 1e-9 * size
     N = np.where(independent[..., None, None], N, np.eye(j))
     d = np.linalg.solve(N, b[..., None])[..., 0]
+    d = np.concatenate([d, np.zeros((k, 1, j))], axis=1)  # standing still is a choice too
+    independent = np.concatenate([independent, np.ones((k, 1), dtype=bool)], axis=1)
     inside = np.all((d >= low[:, None] - 1e-9) & (d <= high[:, None] + 1e-9), axis=-1) & independent
     violation = np.max(value[:, None, :] + np.einsum("kmj,kvj->kvm", gradient, d), axis=-1, initial=-np.inf)
     violation = np.where(inside, np.maximum(violation, 0.0), np.inf)

@@ -50,6 +50,4 @@ def _naca_23012(
     compressibility: Compressibility = "none",
 ) -> TabAileron:
     source = ThinAerofoil(geometry.aileron_hinge, geometry.tab_hinge, mean_line("NACA 23012"))
-    return TabAileron(
-        geometry, inertia, Aerodynamics(source, damping=damping, compressibility=compressibility)
-    )
+    return TabAileron(geometry, inertia, Aerodynamics(source, damping=damping, compressibility=compressibility))

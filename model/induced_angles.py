@@ -19,9 +19,7 @@ from model.section import Geometry
 def induced_angles(geometry: Geometry, airspeed: FloatArray, state: FloatArray) -> FloatArray:
     """Induced angles (*G, 2), order [tab, aileron] [rad], at state ``[dt, dt', da, da']`` (*G, 4)."""
     dt, tab_rate, aileron_rate = state[..., 0], state[..., 1], state[..., 3]
-    tab = (
-        np.cos(dt) * geometry.aileron_chord * aileron_rate + geometry.tab_chord / 4.0 * tab_rate
-    ) / airspeed
+    tab = (np.cos(dt) * geometry.aileron_chord * aileron_rate + geometry.tab_chord / 4.0 * tab_rate) / airspeed
     aileron = geometry.aileron_chord / 4.0 * aileron_rate / airspeed
     return np.stack(np.broadcast_arrays(tab, aileron), axis=-1)
 

@@ -10,9 +10,7 @@ from model.induced_angles import induced_angles
 from model.system import TabAileron
 
 
-def aerodynamic_torque(
-    system: TabAileron, condition: FlightCondition, alpha: Floats, state: FloatArray
-) -> FloatArray:
+def aerodynamic_torque(system: TabAileron, condition: FlightCondition, alpha: Floats, state: FloatArray) -> FloatArray:
     """Torque of the air about each hinge, ``-q c^2 s C_H``, without virtual inertia.
 
     Parameters

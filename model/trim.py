@@ -90,9 +90,7 @@ def trim(system: TabAileron, condition: FlightCondition, request: TrimRequest) -
     )
 
 
-def _zero_aileron_torque(
-    source: HingeMomentSource, alpha: float, aileron: float
-) -> tuple[FloatArray, BoolArray]:
+def _zero_aileron_torque(source: HingeMomentSource, alpha: float, aileron: float) -> tuple[FloatArray, BoolArray]:
     """Tab angle (*H,) at which ``C_Ha`` vanishes, by Newton's method, and whether it was found.
 
     Points that have converged stay where they are, so each takes the same way alone as in company.

@@ -41,9 +41,7 @@ FRAMEWORK_CODES = {404: "not_found", 405: "method_not_allowed", 500: "internal_e
 log = logging.getLogger("gainfield")
 
 
-def problem(
-    status: int, code: str, title: str, detail: str, fields: Sequence[FieldRefusal] = ()
-) -> dict[str, Any]:
+def problem(status: int, code: str, title: str, detail: str, fields: Sequence[FieldRefusal] = ()) -> dict[str, Any]:
     """A problem document."""
     return {
         "type": f"urn:gainfield:problem:{code}",
@@ -51,9 +49,7 @@ def problem(
         "status": status,
         "detail": detail,
         "code": code,
-        "errors": [
-            {"pointer": f.pointer, "detail": f.detail, "unit": f.unit, "allowed": f.allowed} for f in fields
-        ],
+        "errors": [{"pointer": f.pointer, "detail": f.detail, "unit": f.unit, "allowed": f.allowed} for f in fields],
     }
 
 

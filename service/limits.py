@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from model.flight import flight_grid
-from schedules.study import Study
+from schedules.study import PlantStudy
 from service.refusals import FieldRefusal, InvalidRequest, LimitExceeded
 from service.schemas import flight
 from service.schemas.requests import DesignRequest
@@ -77,7 +79,7 @@ def check_design(request: DesignRequest, settings: Settings) -> None:
     check_size("/controllers", "controllers", len(request.controllers), "max_controllers", settings)
 
 
-def check_envelope(study: Study) -> None:
+def check_envelope(study: PlantStudy) -> None:
     """Refuse a grid of which no point lies inside the model: there would be nothing to answer.
 
     Raises
@@ -85,7 +87,8 @@ def check_envelope(study: Study) -> None:
     InvalidRequest
     """
     asked = study.grid
-    grid = flight_grid(asked.altitude, asked.speed_axis, asked.speed, asked.temperature_offset)
+    altitude, speed = np.array(asked.altitude), np.array(asked.speed)
+    grid = flight_grid(altitude, asked.speed_axis, speed, asked.temperature_offset)
     mach = grid.condition.mach
     if not study.aerodynamics.covers(mach).any():
         detail = f"no grid point lies inside the model: the lowest Mach number is {mach.min():.4g}"

@@ -95,7 +95,11 @@ def _of_type(schema: Schema) -> str:
     kind = schema.get("type")
     if kind in ("number", "integer"):
         bounds = [f"{sign} {schema[key]:g}" for key, sign in _BOUNDS.items() if key in schema]
-        return " and ".join([kind, *bounds]) if not bounds else ("an integer " * (kind == "integer")) + " and ".join(bounds)
+        return (
+            " and ".join([kind, *bounds])
+            if not bounds
+            else ("an integer " * (kind == "integer")) + " and ".join(bounds)
+        )
     if kind == "string":
         sizes = [text.format(schema[key]) for key, text in _SIZES.items() if key in schema]
         return ", ".join(["text", *sizes, *([f"matching {schema['pattern']}"] if "pattern" in schema else [])])
@@ -154,4 +158,4 @@ def _detail(kind: str, error: dict[str, Any], context: dict[str, Any]) -> str:
     }
     if kind == "refused":
         return str(context["detail"])
-    return ours.get(kind, error["msg"].replace("Input should", "must"))
+    return ours.get(kind, str(error["msg"]).replace("Input should", "must"))

@@ -60,8 +60,5 @@ def spec_field(quantity: str, sense: Sense) -> SpecField:
 
 #: Every spec there can be, by its name on the wire.
 SPEC_FIELDS: dict[str, SpecField] = {
-    field.name: field
-    for quantity in QUANTITIES
-    for sense in ("min", "max")
-    for field in (spec_field(quantity, sense),)
+    field.name: field for quantity in QUANTITIES for sense in ("min", "max") for field in (spec_field(quantity, sense),)
 }

@@ -29,8 +29,15 @@ def state_of(request: Request) -> State:
 
 
 async def slot(request: Request) -> AsyncIterator[None]:
-    """A place among the computations that run at the same time; waits, without a thread, until one is free."""
-    async with state_of(request).slots:
+    """A place among the computations that run at the same time; waits, without a thread, until one is free.
+
+    What only reads a design that is ready in memory does not wait.
+    """
+    state = state_of(request)
+    if state.designs.ready(request.path_params.get("id", "")):
+        yield
+        return
+    async with state.slots:
         yield
 
 

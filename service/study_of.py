@@ -17,7 +17,7 @@ from model.hinge_moments.camber import mean_line
 from model.hinge_moments.thin_aerofoil import ThinAerofoil
 from model.section import Body, Geometry, Inertia
 from model.trim import TrimRequest
-from schedules.study import Controller, GridRequest, Reference, Study
+from schedules.study import Controller, GridRequest, PlantStudy, Reference, Study
 from service.schemas import actuators, aerodynamics, controllers, flight, requests, section, weights
 from service.spec_names import SPEC_FIELDS
 
@@ -45,19 +45,14 @@ def study(request: requests.DesignRequest) -> Study:
     )
 
 
-def grid_study(request: requests.LinearModelsRequest) -> Study:
-    """The study of a request that asks for linear models only: ideal actuators, no controllers."""
-    return Study(
-        name="linear models",
+def plant_study(request: requests.LinearModelsRequest) -> PlantStudy:
+    """The part of a study that linear models depend on."""
+    return PlantStudy(
         geometry=geometry(request.geometry),
         inertia=inertia(request.inertia),
         aerodynamics=aerodynamic_model(request.aerodynamics, request.geometry),
         trim=trim(request.trim),
         grid=grid(request.grid, request.atmosphere),
-        tab_actuator=Actuator(),
-        aileron_actuator=Actuator(),
-        reference=Reference(aileron=radians(1.0), duration=1.0),
-        controllers=(),
     )
 
 

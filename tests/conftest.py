@@ -4,3 +4,47 @@ import os
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+from types import SimpleNamespace  # noqa: E402
+
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
+
+
+def _wind_tunnel_plant(system, trim_request):
+    from model.flight import flight_grid
+    from model.linearise import linearise
+    from model.servo_tab import servo_tab
+    from model.trim import trim
+
+    grid = flight_grid(np.array([0.0, 3000.0]), "dynamic_pressure", np.array([245.0, 551.25, 980.0, 1531.25]))
+    found = trim(system, grid.condition, trim_request)
+    model = linearise(system, grid.condition, found)
+    return SimpleNamespace(
+        system=system, grid=grid, condition=grid.condition, trim=found, model=model, servo=servo_tab(model)
+    )
+
+
+@pytest.fixture(scope="session")
+def plant_a():
+    """Data set A (example wind_tunnel) over its grid of 2 x 4: system, grid, condition, trim, model, servo."""
+    from model.examples import WIND_TUNNEL_TRIM, wind_tunnel
+
+    return _wind_tunnel_plant(wind_tunnel(), WIND_TUNNEL_TRIM)
+
+
+@pytest.fixture(scope="session")
+def plant_b():
+    """Data set B (example wind_tunnel_23012) over its grid of 2 x 4."""
+    from model.examples import WIND_TUNNEL_TRIM, wind_tunnel_23012
+
+    return _wind_tunnel_plant(wind_tunnel_23012(), WIND_TUNNEL_TRIM)
+
+
+@pytest.fixture(scope="session")
+def tab_actuator():
+    """The tab actuator of the wind-tunnel examples: servo 40 Hz, damping 0.7, with its limits."""
+    from model.actuators import Actuator, ActuatorLimits
+
+    limits = ActuatorLimits(np.deg2rad(25.0), np.deg2rad(400.0), 2.0)
+    return Actuator(2.0 * np.pi * 40.0, 0.7, 2.0 * np.pi * 80.0, limits=limits)

@@ -9,7 +9,7 @@ from model.hinge_moments.expansion import HingeMoments
 
 def derivatives(moments: HingeMoments) -> dict[str, Any]:
     """Coefficient and derivatives of each surface at one point; rows [tab, aileron], columns (alpha, dt, da)."""
-    document = {}
+    document: dict[str, float] = {}
     for row, surface in ((1, "a"), (0, "t")):
         alpha, dt, da = moments.gradient[row].tolist()
         document |= {

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from design.poles import poles
 from model.hinge_moments.expansion import HingeMoments
 from model.linear_model import LinearModel
 from model.servo_tab import ServoTab
@@ -32,7 +33,7 @@ def plant_document(plant: PlantEnvelope, point: int) -> dict[str, Any]:
         "trim": trim_document(plant.trim.take(index)),
         "hinge_moments": hinge_moments_document(plant.hinge_moments.take(index)),
         "linear_model": model_document(model),
-        "poles": np.linalg.eigvals(model.A).astype(complex),
+        "poles": poles(model.A),
         "servo_tab": servo_tab_document(plant.servo_tab.take(index)),
     }
 
@@ -73,6 +74,7 @@ def model_document(model: LinearModel) -> dict[str, Any]:
 
 def servo_tab_document(servo: ServoTab) -> dict[str, Any]:
     """The aileron driven by the tab alone: ``da/dt = numerator / denominator``, highest power first."""
+    restoring = np.isfinite(servo.natural_frequency)
     return {
         "numerator": servo.numerator,
         "denominator": servo.denominator,
@@ -80,4 +82,5 @@ def servo_tab_document(servo: ServoTab) -> dict[str, Any]:
         "zero": servo.zero,
         "omega_n_rad_s": servo.natural_frequency,
         "damping_ratio": servo.damping_ratio,
+        "reason": None if restoring else "the air does not drive the aileron back: it has no natural frequency",
     }

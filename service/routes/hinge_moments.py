@@ -36,9 +36,7 @@ def hinge_moments(request: Request, wanted: HingeMomentsRequest) -> Response:
     return answer(request, encode({"derivatives": derivatives(rest), "states": _states(aerodynamics, wanted, angles)}))
 
 
-def _states(
-    aerodynamics: Aerodynamics, wanted: HingeMomentsRequest, angles: list[FloatArray]
-) -> list[dict[str, Any]]:
+def _states(aerodynamics: Aerodynamics, wanted: HingeMomentsRequest, angles: list[FloatArray]) -> list[dict[str, Any]]:
     """Coefficients at each state, in the order asked for."""
     alpha, dt, da = angles
     value = aerodynamics.source.at(alpha, dt, da).value

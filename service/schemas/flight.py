@@ -142,9 +142,7 @@ class Grid(Request):
         """Refuse a grid with no second axis, or with two."""
         given = [name for name in SPEED_AXES if getattr(self, name) is not None]
         if len(given) != 1:
-            raise refusal(
-                f"a grid has exactly one second axis, not {len(given)}", f"one of {', '.join(SPEED_AXES)}"
-            )
+            raise refusal(f"a grid has exactly one second axis, not {len(given)}", f"one of {', '.join(SPEED_AXES)}")
         return self
 
     @model_serializer(mode="wrap")

@@ -58,10 +58,7 @@ def test_comment_lines_say_what_it_is(make_schedule, content):
     assert f'# law: "{schedule.law}"' in comments
     assert '# out_of_range: "clipped to the grid\'s edges"' in comments
     assert any(line.startswith("# sign_convention: ") for line in comments)
-    assert (
-        '# units: {"altitude_m": "m", "dynamic_pressure_pa": "Pa", "K_p": "1", "K_d": "s", "K_i": "1/s"}'
-        in comments
-    )
+    assert '# units: {"altitude_m": "m", "dynamic_pressure_pa": "Pa", "K_p": "1", "K_d": "s", "K_i": "1/s"}' in comments
     assert '# reason [1, 2]: "gain margin 4.1 dB, \\"short\\", at (1, 2)"' in comments
 
 
@@ -136,9 +133,7 @@ def test_refuses_rows_that_are_not_the_whole_grid(content):
         read_csv(b"\n".join([*lines[:-2], lines[-1], lines[-2]]))
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"a,b\n1,2\n", b"\xff\xfe", b"# " + b"[" * 100_000, b'# format: "x"']
-)
+@pytest.mark.parametrize("content", [b"", b"a,b\n1,2\n", b"\xff\xfe", b"# " + b"[" * 100_000, b'# format: "x"'])
 def test_refuses_what_is_no_schedule(content):
     with pytest.raises(ValueError, match=r"."):
         read_csv(content)

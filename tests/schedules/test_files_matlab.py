@@ -15,9 +15,7 @@ def loaded(schedule, **options):
     return loadmat(io.BytesIO(write_schedule(schedule, "mat")), **options)
 
 
-@pytest.mark.parametrize(
-    ("shape", "failed"), [((4, 6), [(1, 2)]), ((1, 6), []), ((4, 1), []), ((2, 3, 4), [])]
-)
+@pytest.mark.parametrize(("shape", "failed"), [((4, 6), [(1, 2)]), ((1, 6), []), ((4, 1), []), ((2, 3, 4), [])])
 def test_scipy_reads_axes_gains_and_mask(make_schedule, shape, failed):
     schedule = make_schedule(shape, failed=failed)
     content = loaded(schedule)

@@ -104,9 +104,7 @@ def test_constant_along_an_axis_of_one_breakpoint(make_schedule, shape, single):
         assert np.all(found.clipped == clipped)
         for gain, original in zip(found.gains, schedule.gains, strict=True):
             line = original.values.ravel()
-            np.testing.assert_allclose(
-                gain.values, np.interp(x, other, line), rtol=1e-13, atol=1e-15 * abs(line).max()
-            )
+            np.testing.assert_allclose(gain.values, np.interp(x, other, line), rtol=1e-13, atol=1e-15 * abs(line).max())
 
 
 def test_infinities_are_clipped_and_nan_is_refused(make_schedule):

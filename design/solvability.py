@@ -1,0 +1,140 @@
+"""Does the regulator problem have a stabilising solution? Point by point, and if not, which mode forbids it.
+
+With ``R > 0`` and ``Q - N R^-1 N' >= 0`` the stabilising solution exists exactly when (Kucera 1972) ::
+
+    (A, B) is stabilisable, and
+    (Q - N R^-1 N', A - B R^-1 N') has no unobservable mode on the imaginary axis.
+
+An unobservable mode in the right half plane is no obstacle: the stabilising solution mirrors it into the left
+half plane, at the least cost of control. One on the axis mirrors into itself, so no feedback of this kind moves it.
+Both conditions are rank tests (Popov, Belevitch, Hautus) in balanced coordinates, with A scaled to unit size,
+the columns of B and the rows of Q to unit length: how strongly an input acts or a state is weighted does not matter, only whether.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.regulator import RegulatorProblem, RiccatiEquation, regulator_problem
+from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, ObjectArray
+
+#: A singular value below this, relative to the balanced matrices, is a loss of rank.
+RANK = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Solvability(GridArrays):
+    """Rank tests over the grid.
+
+    Attributes
+    ----------
+    control_distance : (*G,) smallest singular value of ``[sI - A, B]`` over the eigenvalues s of A that are not
+        stable; inf where all are
+    observation_distance : (*G,) smallest singular value of ``[jwI - A; Q]`` over the axis
+    uncontrolled : (*G,) the eigenvalue of A [1/s] that the first is smallest at
+    unobserved : (*G,) the point of the axis [1/s] that the second is smallest at
+    reasons : (*G,) object array of str, None where the problem has a stabilising solution
+    """
+
+    control_distance: FloatArray
+    observation_distance: FloatArray
+    uncontrolled: ComplexArray
+    unobserved: ComplexArray
+    reasons: ObjectArray
+
+    @property
+    def stabilisable(self) -> BoolArray:
+        """(*G,) every mode that is not stable is reached by an input."""
+        return np.asarray(self.control_distance > RANK)
+
+    @property
+    def observable_on_axis(self) -> BoolArray:
+        """(*G,) every mode on the imaginary axis is seen by Q."""
+        return np.asarray(self.observation_distance > RANK)
+
+
+def solvability(A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, N: FloatArray | None = None) -> Solvability:
+    """Whether each point has a stabilising solution, and the eigenvalue which forbids it.
+
+    Parameters
+    ----------
+    A (*G, n, n), B (*G, n, m) : the plant
+    Q (n, n), R (m, m), N (n, m) or None : weights, with or without the grid's axes; R > 0, Q - N R^-1 N' >= 0
+
+    Raises
+    ------
+    ValueError : shapes that do not belong together
+    """
+    grid = A.shape[:-2]
+    with np.errstate(all="ignore"):
+        result = problem_solvability(regulator_problem(A, B, Q, R, N))
+    return Solvability(
+        result.control_distance.reshape(grid),
+        result.observation_distance.reshape(grid),
+        result.uncontrolled.reshape(grid),
+        result.unobserved.reshape(grid),
+        result.reasons.reshape(grid),
+    )
+
+
+def problem_solvability(problem: RegulatorProblem) -> Solvability:
+    """`solvability` of a problem over N points."""
+    equation = problem.equation
+    eigenvalues = np.linalg.eigvals(equation.A).astype(complex)
+    control, worst_control = _control_distance(equation, eigenvalues)
+    observation, worst_observation = _observation_distance(equation, eigenvalues)
+    rate = np.ldexp(1.0, equation.time_exponent)
+    uncontrolled, unobserved = worst_control * rate, worst_observation * rate
+    reasons = np.full(len(rate), None, dtype=object)
+    for i in np.flatnonzero(~problem.posed | (control <= RANK) | (observation <= RANK)):
+        if not problem.posed[i]:
+            reasons[i] = "R is not positive definite, Q is not symmetric, or the data are not finite"
+        elif control[i] <= RANK:
+            reasons[i] = f"(A, B) is not stabilisable: no input reaches the mode at {_rate(uncontrolled[i])} 1/s"
+        else:
+            matrix = "Q - N R^-1 N'" if np.any(problem.cross[i]) else "Q"
+            reasons[i] = (
+                f"{matrix} does not see the mode at {_rate(unobserved[i])} 1/s on the imaginary axis: "
+                "no stabilising solution; give that mode a weight"
+            )
+    return Solvability(control, observation, uncontrolled, unobserved, reasons)
+
+
+def _rate(s: complex) -> str:
+    return f"{s.real:.6g}" if s.imag == 0 else f"{s.real:.6g}{s.imag:+.6g}j"
+
+
+def _control_distance(equation: RiccatiEquation, eigenvalues: ComplexArray) -> tuple[FloatArray, ComplexArray]:
+    """Smallest singular value of ``[sI - A, B]`` over the eigenvalues with ``Re s >= 0``, and that s."""
+    length = np.linalg.norm(equation.F, axis=1, keepdims=True)
+    inputs = equation.F / np.where(length > 0, length, 1.0)
+    distance = _smallest_singular(eigenvalues, equation.A, inputs)
+    size = np.max(np.abs(equation.A), axis=(1, 2))[:, None]
+    distance[eigenvalues.real < -RANK * size] = np.inf
+    return _worst(distance, eigenvalues)
+
+
+def _observation_distance(equation: RiccatiEquation, eigenvalues: ComplexArray) -> tuple[FloatArray, ComplexArray]:
+    """Smallest singular value of ``[jwI - A; Q]`` at the points of the axis below the eigenvalues, and that jw."""
+    length = np.linalg.norm(equation.Q, axis=2, keepdims=True)
+    seen = equation.Q / np.where(length > 0, length, 1.0)
+    axis = 1j * eigenvalues.imag
+    return _worst(_smallest_singular(axis, equation.A.mT, seen.mT), axis)
+
+
+def _smallest_singular(s: ComplexArray, A: FloatArray, right: FloatArray) -> FloatArray:
+    """Smallest singular value of ``[sI - A, right]`` (N, n) at each of the n values s, in the size of A."""
+    n = A.shape[-1]
+    size = np.max(np.abs(A), axis=(1, 2))[:, None]
+    size = np.where(size > 0, size, 1.0)
+    pencil = (s / size)[:, :, None, None] * np.eye(n) - (A / size[:, :, None])[:, None]
+    right = np.broadcast_to(right[:, None], (*s.shape, *right.shape[1:]))
+    matrix = np.concatenate([pencil, right], axis=-1)
+    return np.asarray(np.linalg.svd(matrix, compute_uv=False)[..., -1])
+
+
+def _worst(distance: FloatArray, s: ComplexArray) -> tuple[FloatArray, ComplexArray]:
+    worst = np.argmin(distance, axis=1)[:, None]
+    return np.take_along_axis(distance, worst, 1)[:, 0], np.take_along_axis(s, worst, 1)[:, 0]

@@ -1,0 +1,63 @@
+"""The application: routes, errors, limits and documentation put together for given settings."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from anyio import Semaphore
+from fastapi import FastAPI
+from fastapi_offline import FastAPIOffline
+
+from service import errors, openapi
+from service.body_limit import BodyLimit
+from service.designs import Designs, design_id
+from service.examples import NAMES, example
+from service.head_requests import HeadRequests
+from service.routes import ROUTERS
+from service.schemas.requests import DesignRequest
+from service.settings import Settings
+from service.state import State
+from service.store import DesignStore
+from service.version import release
+
+#: Swagger UI: ready to try, searchable, and silent towards the validator it would ask on the internet.
+SWAGGER = {"tryItOutEnabled": True, "filter": True, "displayRequestDuration": True, "validatorUrl": None}
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """The application for these settings; without them, for those of the environment.
+
+    Nothing is opened before the application starts, and what it opened is closed when it stops.
+    """
+    chosen = settings or Settings()
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        designs = Designs(DesignStore(chosen.data_dir), chosen.kept_envelopes)
+        app.state.shared = State(chosen, designs, Semaphore(chosen.max_concurrent_designs))
+        try:
+            yield
+        finally:
+            designs.close()
+
+    app: FastAPI = FastAPIOffline(
+        title="Gainfield",
+        version=release(),
+        description=openapi.DESCRIPTION,
+        lifespan=lifespan,
+        swagger_ui_parameters=SWAGGER,
+        license_info={"name": "MIT", "identifier": "MIT"},
+    )
+    for router in ROUTERS:
+        app.include_router(router)
+    errors.install(app)
+    openapi.install(app, example_id)
+    app.add_middleware(BodyLimit, limit=chosen.max_body_bytes)
+    app.add_middleware(HeadRequests)
+    return app
+
+
+def example_id() -> str:
+    """Id that the design of the first shipped example gets from this code."""
+    return design_id(DesignRequest.model_validate(example(NAMES[0])))

@@ -1,0 +1,202 @@
+"""Designs by request and by id: made once, kept as bytes, made again when more than the bytes is asked for."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import TypeVar
+
+import numpy as np
+import orjson
+
+from design.weights import WeightsRefused
+from model.arrays import FloatArray
+from schedules.analysis import PlantEnvelope, analyse
+from schedules.run import DesignedController, DesignedEnvelope, run
+from schedules.schedule import Provenance
+from schedules.study import PlantStudy
+from service import study_of
+from service.answering import encode
+from service.envelopes import Envelopes
+from service.limits import check_envelope
+from service.presenters.design import design_document
+from service.presenters.grid import grid_index
+from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound, StaleDesign
+from service.schemas.requests import DesignRequest, LinearModelsRequest
+from service.store import DesignStore, ListedDesign, StoredDesign
+from service.version import code_version
+
+#: Largest relative change of a gain between a stored design and the same design made again.
+SAME_GAINS = 1e-9
+
+StudyKind = TypeVar("StudyKind", bound=PlantStudy)
+Result = TypeVar("Result")
+
+log = logging.getLogger("gainfield")
+
+
+def canonical(request: DesignRequest) -> bytes:
+    """The normalised request as bytes: the same for every spelling of the same request."""
+    return orjson.dumps(request.normalised(), option=orjson.OPT_SORT_KEYS)
+
+
+def design_id(request: DesignRequest) -> str:
+    """Id of the design: hash of the canonical request and of the code that answers it."""
+    return hashlib.sha256(canonical(request) + b"\0" + code_version().encode()).hexdigest()[:32]
+
+
+class Designs:
+    """The designs of one server."""
+
+    def __init__(self, store: DesignStore, kept: int) -> None:
+        self._store = store
+        self._envelopes = Envelopes(kept)
+
+    def close(self) -> None:
+        """Close the store."""
+        self._store.close()
+
+    def create(self, request: DesignRequest) -> tuple[StoredDesign, bool]:
+        """The design of this request, and whether it is new; it is on the disk when this returns.
+
+        Raises
+        ------
+        InvalidRequest : no point of the grid lies inside the model, or the model refuses the numbers
+        WeightsRefused : the weights of a controller cannot work
+        """
+        ident = design_id(request)
+        found = self._store.get(ident)
+        if found is not None:
+            return found, False
+        envelope = self._envelopes.get(ident, lambda: _asked(study_of.study(request), run))
+        made = _stored(ident, request, envelope)
+        kept = self._store.add(made)
+        return kept, kept is made
+
+    def find(self, ident: str) -> StoredDesign:
+        """The stored design.
+
+        Raises
+        ------
+        NotFound
+        """
+        found = self._store.get(ident)
+        if found is None:
+            raise NotFound(f"there is no design {ident[:80]!a}")
+        return found
+
+    def page(self, limit: int, before: int | None) -> list[ListedDesign]:
+        """Designs newest first, made before the one whose `seq` is given."""
+        return self._store.page(limit, before)
+
+    def ready(self, ident: str) -> bool:
+        """Whether the envelope of this design is in memory."""
+        return ident in self._envelopes
+
+    def envelope(self, ident: str) -> DesignedEnvelope:
+        """The designed envelope behind a stored design, from memory or made again from its request.
+
+        Raises
+        ------
+        NotFound : there is no such design
+        StaleDesign : made again by this code, its gains differ from those that were answered
+        """
+        stored = self.find(ident)
+        return self._envelopes.get(ident, lambda: _made_again(stored))
+
+    def provenance(self, ident: str) -> Provenance:
+        """Where the schedules of this design come from."""
+        stored = self.find(ident)
+        digest = hashlib.sha256(stored.request).hexdigest()
+        return Provenance(stored.id, stored.name, digest, stored.version, stored.created_at)
+
+
+def _asked(study: StudyKind, function: Callable[[StudyKind], Result]) -> Result:
+    """Ask the domain about a study; what it refuses is a refused request, not a fault of the server."""
+    check_envelope(study)
+    try:
+        return function(study)
+    except WeightsRefused:
+        raise
+    except (ValueError, ArithmeticError) as error:
+        log.warning("a study was refused by the model", exc_info=error)
+        raise InvalidRequest(f"the model cannot answer for these numbers: {error}") from error
+
+
+def _stored(ident: str, request: DesignRequest, envelope: DesignedEnvelope) -> StoredDesign:
+    created_at = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    document = design_document(ident, request.normalised(), created_at, envelope)
+    return StoredDesign(ident, request.name, created_at, code_version(), canonical(request), encode(document))
+
+
+def _made_again(stored: StoredDesign) -> DesignedEnvelope:
+    envelope = _asked(study_of.study(DesignRequest.model_validate_json(stored.request)), run)
+    answered = orjson.loads(stored.answer)["controllers"]
+    for controller, before in zip(envelope.controllers, answered, strict=True):
+        if not _same_gains(controller, before["gains"]):
+            raise StaleDesign(
+                f"the design was made by version {stored.version}; made again by {code_version()}, the gains of "
+                f"controller {controller.request.name} differ. Post its request again for a design of this version"
+            )
+    return envelope
+
+
+def _same_gains(controller: DesignedController, answered: list[dict[str, object]]) -> bool:
+    """Whether the gains are those of the stored answer, missing ones included."""
+    if [gain.name for gain in controller.gains] != [gain["name"] for gain in answered]:
+        return False
+    return all(
+        _same(gain.values, np.array(before["values"], dtype=float))
+        for gain, before in zip(controller.gains, answered, strict=True)
+    )
+
+
+def _same(now: FloatArray, before: FloatArray) -> bool:
+    return now.shape == before.shape and np.allclose(now, before, rtol=SAME_GAINS, atol=0.0, equal_nan=True)
+
+
+def analysed(request: LinearModelsRequest) -> PlantEnvelope:
+    """The plant over the grid of a request, no controllers.
+
+    Raises
+    ------
+    InvalidRequest : no point of the grid lies inside the model, or the model refuses the numbers
+    """
+    return _asked(study_of.plant_study(request), analyse)
+
+
+def controller_of(envelope: DesignedEnvelope, name: str) -> DesignedController:
+    """The controller of this name.
+
+    Raises
+    ------
+    NotFound
+    """
+    try:
+        return envelope.controller(name)
+    except KeyError:
+        names = ", ".join(controller.request.name for controller in envelope.controllers)
+        raise NotFound(f"there is no controller {name[:80]!a}; there are {names}") from None
+
+
+def point_with_gains(envelope: DesignedEnvelope, controller: DesignedController, point: int) -> tuple[int, ...]:
+    """Index into grid arrays of a flat point at which the controller has gains.
+
+    Raises
+    ------
+    InvalidRequest : the grid has no such point
+    NoDesignAtPoint : the controller carries no gains there
+    """
+    size = envelope.plant.outcomes.codes.size
+    if not 0 <= point < size:
+        detail = f"the grid has no point {point}"
+        raise InvalidRequest(f"/point: {detail}", FieldRefusal("/point", detail, None, f">= 0 and <= {size - 1}"))
+    index = grid_index(envelope.plant.grid, point)
+    if not controller.outcomes.ok[index]:
+        outcome, reason = controller.outcomes.codes[index], controller.outcomes.reasons[index]
+        raise NoDesignAtPoint(
+            f"the controller {controller.request.name} has no gains at point {point}: {outcome}; {reason}"
+        )
+    return index

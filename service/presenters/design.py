@@ -1,0 +1,101 @@
+"""A design on the wire: gains, outcomes and verdicts over the grid, and links to everything else."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from design.gains import Gain
+from design.specs import Verdict
+from schedules.files import FILE_FORMATS
+from schedules.run import DesignedController, DesignedEnvelope
+from service.presenters.grid import air_document, grid_document, outcome_documents, warning_documents
+from service.spec_names import spec_field
+from service.version import code_version, solver
+
+
+def design_document(ident: str, request: dict[str, Any], created_at: str, envelope: DesignedEnvelope) -> dict[str, Any]:
+    """The answer to a design request."""
+    plant = envelope.plant
+    return {
+        "id": ident,
+        "name": envelope.study.name,
+        "request": request,
+        "provenance": {"version": code_version(), "created_at": created_at, "solver": solver()},
+        "grid": grid_document(plant.grid),
+        "air": air_document(plant.grid.condition),
+        "outcomes": plant.outcomes.codes,
+        "reasons": plant.outcomes.reasons,
+        "warnings": warning_documents(envelope.warnings),
+        "controllers": [_controller(controller) for controller in envelope.controllers],
+        "links": links(ident, [controller.request.name for controller in envelope.controllers]),
+    }
+
+
+def _controller(controller: DesignedController) -> dict[str, Any]:
+    return {
+        "name": controller.request.name,
+        "kind": controller.request.kind,
+        **outcome_documents(controller.outcomes),
+        "gains": [_gain(gain) for gain in controller.gains],
+        "verdicts": [verdict_over_grid(verdict) for verdict in controller.verdicts],
+    }
+
+
+def _gain(gain: Gain) -> dict[str, Any]:
+    return {"name": gain.name, "unit": gain.unit, "values": gain.values}
+
+
+def verdict_over_grid(verdict: Verdict) -> dict[str, Any]:
+    """A spec, its worst value over the points that carry a design, and whether all of them meet it."""
+    field = spec_field(verdict.spec.quantity, verdict.spec.sense)
+    worst = verdict.worst
+    value = None if worst is None else _finite(field.value(float(verdict.values.flat[worst])))
+    return {
+        "spec": field.name,
+        "limit": field.limit(verdict.spec),
+        "unit": field.unit,
+        "source": verdict.spec.source,
+        "worst_value": value,
+        "worst_point": worst,
+        "points_judged": int(verdict.judged.sum()),
+        "points_passed": int(verdict.passed.sum()),
+        "passed": worst is not None and bool(np.all(verdict.passed[verdict.judged])),
+        "reason": _why_no_value(worst, value, verdict),
+    }
+
+
+def _why_no_value(worst: int | None, value: float | None, verdict: Verdict) -> str | None:
+    """Why there is no worst value; None when there is one."""
+    if worst is None:
+        return "no point carries a design"
+    if value is not None:
+        return None
+    if np.isinf(verdict.values.flat[worst]):
+        return "unlimited at every point"
+    return "the value does not exist there: the response does not reach it within the time it is followed"
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def links(ident: str, controllers: list[str]) -> dict[str, Any]:
+    """Addresses of what belongs to a design, by controller where there is one."""
+    here = f"/v1/designs/{ident}"
+
+    def each(what: str) -> dict[str, str]:
+        return {name: f"{here}/controllers/{name}/{what}" for name in controllers}
+
+    return {
+        "self": here,
+        "points": f"{here}/points/{{index}}",
+        "root_locus": each("root-locus"),
+        "response": each("response"),
+        "actuator_requirements": each("actuator-requirements"),
+        "gains": each("gains"),
+        "schedules": {
+            name: {suffix: f"{here}/schedules/{name}.{suffix}" for suffix in FILE_FORMATS} for name in controllers
+        },
+    }

@@ -1,0 +1,125 @@
+"""One controller of a design: root locus, step response, actuator requirements, gains between the grid points."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from fastapi import APIRouter, Path, Query, Request, Response
+from pydantic import BaseModel, Field
+
+from design.response import step_response
+from schedules.interpolate import interpolate
+from schedules.run import DesignedEnvelope
+from schedules.wire_names import axis_name
+from service.answering import answer, encode
+from service.designs import controller_of, point_with_gains
+from service.limits import check_size
+from service.openapi import problems
+from service.presenters.gains import gains_document
+from service.presenters.requirements import reference_document, requirements_document
+from service.presenters.response import response_document
+from service.refusals import FieldRefusal, InvalidRequest
+from service.routes.designs import DesignId
+from service.schedule_of import schedule_of
+from service.schemas.controller import InterpolatedGains, Requirements
+from service.schemas.controller import Response as StepResponse
+from service.schemas.wire import PARAMETERS
+from service.state import HEAVY, DesignsHere, SettingsHere
+from service.units import unit_of
+
+router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}", tags=["controllers"])
+
+ControllerName = Annotated[str, Path(alias="name", description="Name of the controller", examples=["nf"])]
+Point = Annotated[int, Field(description="Flat row-major index of the grid point, from 0", examples=[3])]
+
+
+class WantedResponse(BaseModel):
+    """Which response is wanted, and how finely."""
+
+    model_config = PARAMETERS
+
+    point: Point
+    kind: Literal["linear"] = Field(default="linear", description="This version answers the exact linear response")
+    duration_s: Annotated[float, Field(ge=1e-3, le=1e3)] | None = Field(
+        default=None, description="How long it is followed; without it, as long as the design's reference"
+    )
+    samples: Annotated[int, Field(ge=2)] = Field(default=501, description="Samples, both ends included")
+
+
+class FlightConditionWanted(BaseModel):
+    """The flight condition in the grid's own axes."""
+
+    model_config = PARAMETERS
+
+    altitude_m: float = Field(description="Geopotential altitude", examples=[1000.0])
+    dynamic_pressure_pa: float | None = Field(default=None, description="When it is the grid's axis", examples=[700.0])
+    airspeed_m_s: float | None = Field(default=None, description="When it is the grid's axis")
+    mach: float | None = Field(default=None, description="When it is the grid's axis")
+
+
+@router.get("/response", response_model=StepResponse, responses=problems(404, 409, 422, 503), dependencies=[HEAVY])
+def response(
+    request: Request,
+    ident: DesignId,
+    name: ControllerName,
+    wanted: Annotated[WantedResponse, Query()],
+    designs: DesignsHere,
+    settings: SettingsHere,
+) -> Response:
+    """The response to the design's reference step at one point: every signal, trim values included."""
+    check_size("/samples", "samples", wanted.samples, "max_response_samples", settings)
+    envelope = designs.envelope(ident)
+    controller = controller_of(envelope, name)
+    index = point_with_gains(envelope, controller, wanted.point)
+    reference = envelope.study.reference
+    duration = wanted.duration_s or reference.duration
+    found = step_response(controller.loop.take(index), np.array([reference.aileron]), duration, wanted.samples)
+    document = {"name": name, "point": wanted.point, "kind": wanted.kind}
+    return answer(request, encode(document | reference_document(reference, duration) | response_document(found)))
+
+
+@router.get(
+    "/actuator-requirements",
+    response_model=Requirements,
+    responses=problems(404, 409, 503),
+    dependencies=[HEAVY],
+)
+def actuator_requirements(request: Request, ident: DesignId, name: ControllerName, designs: DesignsHere) -> Response:
+    """What the reference step asks of each actuator: torque, rate, power and energy over the grid, and the worst."""
+    envelope = designs.envelope(ident)
+    return answer(request, encode(requirements_document(envelope, controller_of(envelope, name))))
+
+
+@router.get("/gains", response_model=InterpolatedGains, responses=problems(404, 409, 422, 503), dependencies=[HEAVY])
+def gains(
+    request: Request,
+    ident: DesignId,
+    name: ControllerName,
+    wanted: Annotated[FlightConditionWanted, Query()],
+    designs: DesignsHere,
+) -> Response:
+    """Gains at a flight condition: multilinear in the grid's own axes, clipped to its edges outside."""
+    envelope = designs.envelope(ident)
+    schedule = schedule_of(envelope, controller_of(envelope, name), designs.provenance(ident))
+    coordinates = _coordinates(envelope, wanted)
+    found = interpolate(schedule, tuple(coordinates.values()))
+    return answer(request, encode(gains_document(schedule, coordinates, found)))
+
+
+def _coordinates(envelope: DesignedEnvelope, wanted: FlightConditionWanted) -> dict[str, float]:
+    """One coordinate an axis of the grid, in the order of the axes.
+
+    Raises
+    ------
+    InvalidRequest : an axis is missing, or one is given that the grid does not have
+    """
+    axes = [axis_name(axis) for axis in envelope.plant.grid.axes]
+    given = {key: value for key, value in wanted.model_dump().items() if value is not None}
+    wrong = [(key, "this axis of the grid is missing") for key in axes if key not in given]
+    wrong += [(key, "the grid has no such axis") for key in given if key not in axes]
+    if wrong:
+        allowed = f"the grid's axes: {', '.join(axes)}"
+        fields = [FieldRefusal(f"/{key}", detail, unit_of(key), allowed) for key, detail in wrong]
+        raise InvalidRequest(f"{fields[0].pointer}: {fields[0].detail}", *fields)
+    return {key: given[key] for key in axes}

@@ -1,0 +1,139 @@
+"""Answers about designs: the design itself, and the list of them."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from service.schemas.requests import DesignRequest
+from service.schemas.wire import Answer
+
+OutcomeCode = Literal["ok", "infeasible", "not_certified", "outside_model", "excluded"]
+Kind = Literal["negative_feedback", "positive_feedback", "lqr"]
+#: Arrays in the grid's shape, first axis first; null where a value does not exist.
+GridNumbers = list[list[float | None]]
+GridOutcomes = list[list[OutcomeCode]]
+GridReasons = list[list[str | None]]
+
+
+class Provenance(Answer):
+    """Which code made the design, when, and with which numerical libraries."""
+
+    version: str
+    created_at: str
+    solver: str
+
+
+class GridAxis(Answer):
+    """One axis: its name, which ends in its unit, and its breakpoints."""
+
+    name: Literal["altitude_m", "dynamic_pressure_pa", "airspeed_m_s", "mach"]
+    values: list[float]
+
+
+class Grid(Answer):
+    """Axes, and the shape of every array over them."""
+
+    axes: list[GridAxis]
+    shape: list[int]
+
+
+class GridAir(Answer):
+    """Air and speed over the grid."""
+
+    altitude_m: GridNumbers
+    airspeed_m_s: GridNumbers
+    dynamic_pressure_pa: GridNumbers
+    mach: GridNumbers
+    density_kg_m3: GridNumbers
+    temperature_k: GridNumbers
+    pressure_pa: GridNumbers
+    speed_of_sound_m_s: GridNumbers
+
+
+class EnvelopeWarning(Answer):
+    """Something to know about some points, by flat row-major index."""
+
+    code: str
+    detail: str
+    points: list[int]
+
+
+class Gain(Answer):
+    """One gain over the grid, SI and radians; null where the outcome is not ok."""
+
+    name: str
+    unit: str
+    values: GridNumbers
+
+
+class Verdict(Answer):
+    """A spec over the points that carry a design: its worst value, where, and whether all meet it."""
+
+    spec: str
+    limit: float = Field(json_schema_extra={"unit": "see `unit`"})
+    unit: str
+    source: Literal["request", "spec_pack", "limits"]
+    worst_value: float | None = Field(json_schema_extra={"unit": "see `unit`"})
+    worst_point: int | None
+    points_judged: int
+    points_passed: int
+    passed: bool
+    reason: str | None
+
+
+class Controller(Answer):
+    """One controller over the grid."""
+
+    name: str
+    kind: Kind
+    outcomes: GridOutcomes
+    reasons: GridReasons
+    gains: list[Gain]
+    verdicts: list[Verdict]
+
+
+class Links(Answer):
+    """Addresses of what belongs to the design, by controller where there is one."""
+
+    self: str
+    points: str
+    root_locus: dict[str, str]
+    response: dict[str, str]
+    actuator_requirements: dict[str, str]
+    gains: dict[str, str]
+    schedules: dict[str, dict[str, str]]
+
+
+class Design(Answer):
+    """A design: gains, outcomes and verdicts over the grid."""
+
+    id: str
+    name: str
+    request: DesignRequest
+    provenance: Provenance
+    grid: Grid
+    air: GridAir
+    outcomes: GridOutcomes
+    reasons: GridReasons
+    warnings: list[EnvelopeWarning]
+    controllers: list[Controller]
+    links: Links
+
+
+class ListedDesign(Answer):
+    """A design in the list."""
+
+    id: str
+    name: str
+    created_at: str
+    version: str
+    link: str
+
+
+class DesignList(Answer):
+    """One page of designs, newest first; null when there is no next page."""
+
+    items: list[ListedDesign]
+    next_cursor: str | None

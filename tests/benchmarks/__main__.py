@@ -1,0 +1,46 @@
+"""``make bench``: every comparison in one run, with the best ratio and its spread.
+
+Each row first checks that both sides computed the same. Times are wall times on one BLAS thread; the ratio is the
+peer's best time over our best, the spread that of the pairs run one after the other.
+"""
+
+import os
+
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"
+
+import argparse  # noqa: E402
+import platform  # noqa: E402
+import warnings  # noqa: E402
+from importlib.metadata import version  # noqa: E402
+from importlib.util import find_spec  # noqa: E402
+
+from tests.benchmarks.measure import measure  # noqa: E402
+from tests.benchmarks.rows import rows  # noqa: E402
+
+
+def main() -> None:
+    """Print one line a comparison."""
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
+    parser.add_argument("--repeats", type=int, default=5, help="timed pairs a row (default 5)")
+    parser.add_argument("--only", default="", help="rows whose name contains this")
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore")
+    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "control"))
+    slycot = "with slycot" if find_spec("slycot") else "without slycot"
+    print(f"Python {platform.python_version()}, {versions} ({slycot}), one BLAS thread, {arguments.repeats} pairs a row")
+    print(f"{'job':<42} {'peer':<28} {'ours ms':>9} {'peer ms':>9} {'ratio':>7} {'spread':>15} {'goal':>6}")
+    for row in rows():
+        if arguments.only not in row.job:
+            continue
+        done = measure(row, arguments.repeats)
+        low, high = done.spread
+        verdict = "met" if done.ratio >= row.goal else "MISSED"
+        print(
+            f"{row.job:<42} {row.peer:<28} {1e3 * min(done.ours):>9.2f} {1e3 * min(done.theirs):>9.1f} "
+            f"{done.ratio:>7.1f} {low:>7.1f}..{high:<6.1f} {row.goal:>6g} {verdict}",
+            flush=True,
+        )
+
+
+main()
