@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.demand import ActuatorDemand, actuator_demand
+from design.demand import ActuatorDemand, actuator_demands
 from design.loop import Loop
 from design.margins import Margins, margins
 from design.poles import least_damping_ratio, poles
@@ -53,7 +53,7 @@ def assess(loop: Loop, reference: FloatArray, duration: float, samples: int = 50
         poles=poles(loop.closed),
         margins=tuple(margins(loop.cut(name)) for name in loop.inputs),
         step=step_metrics(loop, response, "da", reference),
-        demand=tuple(actuator_demand(loop, response, name) for name in loop.inputs),
+        demand=actuator_demands(loop, response, loop.inputs),
         actuators=loop.inputs,
     )
 

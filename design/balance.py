@@ -48,7 +48,7 @@ def balance_exponents(A: FloatArray, F: FloatArray, Q: FloatArray) -> IntArray:
         columns = np.max(h - d[:, :, None], axis=1) + d
     size = np.max(columns, axis=1, keepdims=True)
     size[~np.isfinite(size)] = 0.0
-    return np.rint(np.concatenate([d[:, :n], size], axis=1)).astype(np.int64)
+    return np.asarray(np.rint(np.concatenate([d[:, :n], size], axis=1)), dtype=np.int64)
 
 
 def _log2_hamiltonian(A: FloatArray, F: FloatArray, Q: FloatArray) -> FloatArray:

@@ -6,13 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from design.extremes import NOISE, SAMPLED_PART
 from design.interpolant import Extremes, crossings, local_maxima, windows
 from model.arrays import FloatArray, GridArrays, IntArray
-
-#: A sampled maximum lies above this part of the maximum it stands for, on samples that resolve the signal.
-SAMPLED_PART = 0.8
-#: A sample that stands out by less than this part of the largest is rounding.
-NOISE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +76,7 @@ class Course:
 
     def undershoot(self) -> FloatArray:
         """(N,) largest excursion the wrong way, >= 0."""
-        largest: FloatArray = np.maximum(np.max(-self.flat, axis=-1), 0.0)
+        largest: FloatArray = np.maximum(0.0 - np.min(self.flat, axis=-1), 0.0)
         found = self._maxima(-self.fraction)
         np.maximum.at(largest, found.row // len(self.times), found.value)
         return largest

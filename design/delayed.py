@@ -14,7 +14,9 @@ from model.arrays import ComplexArray, FloatArray, IntArray
 
 #: Above the last frequency where ``|L|`` reaches this, nothing is looked for: a gain margin beyond 60 dB.
 QUIET = 1e-3
-#: Points of the logarithmic and of the linear part of the grid.
+#: Below the last frequency where ``|L|`` reaches this, the grid is denser: high peaks of S are there.
+LOUD = 0.2
+#: Points of the logarithmic part of the grid, and of each of the linear parts.
 POINTS = 1024
 #: Largest frequency times delay [rad]: eight points of the linear part to a turn of the delay.
 LARGEST_TURN = 0.25 * np.pi * POINTS
@@ -24,29 +26,37 @@ OFFSETS = np.array([-8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0])
 
 def search_grid(loop: ClosedLoop) -> FloatArray:
     """Frequencies (N, W), rising from 0, in units of the loop's scale."""
-    ratio = loop.transfer
-    x = roots(squared_magnitude(ratio.denominator) - squared_magnitude(ratio.numerator) / QUIET**2)
-    with np.errstate(invalid="ignore"):
-        audible = np.where((x.real > 0.0) & (np.abs(x.imag) <= 1e-6 * np.abs(x)), x.real, 0.0)
+    ratio, count = loop.transfer, loop.poles.shape[-1]
     features = np.concatenate([loop.poles, roots(ratio.denominator), roots(ratio.numerator)], axis=-1)
     features = np.where(np.isnan(features), 0.0, features)
     size = np.abs(features)
-    top = np.maximum(np.sqrt(audible.max(axis=-1)), 2.0 * size[:, : loop.poles.shape[-1]].max(axis=-1))
-    top = np.minimum(top, LARGEST_TURN / loop.delay)
+    widest = 2.0 * size[:, :count].max(axis=-1)
+    limit = LARGEST_TURN / loop.delay
+    loud, top = (np.minimum(np.maximum(_last_above(loop, level), widest), limit) for level in (LOUD, QUIET))
     bottom = np.minimum(np.where(size > 1e-6, size, 1.0).min(axis=-1), top) * 1e-3
     steps = np.linspace(0.0, 1.0, POINTS)
     near = np.abs(features.imag)[..., None] + np.abs(features.real)[..., None] * OFFSETS
     parts = (
         bottom[:, None] * (top / bottom)[:, None] ** steps,
         top[:, None] * steps,
+        loud[:, None] * steps,
         np.clip(near.reshape(near.shape[0], -1), 0.0, top[:, None]),
     )
     return np.sort(np.concatenate(parts, axis=-1), axis=-1)
 
 
+def _last_above(loop: ClosedLoop, level: float) -> FloatArray:
+    """Largest frequency (N,) where ``|L|`` is `level`; 0 where it is less throughout."""
+    top, bottom = (squared_magnitude(p) for p in (loop.transfer.numerator, loop.transfer.denominator))
+    x = roots(bottom - top / level**2)
+    with np.errstate(invalid="ignore"):
+        real = (x.real > 0.0) & (np.abs(x.imag) <= 1e-6 * np.abs(x))
+    return np.asarray(np.sqrt(np.where(real, x.real, 0.0).max(axis=-1)))
+
+
 def turned_numerator(loop: ClosedLoop, rows: IntArray, omega: FloatArray) -> ComplexArray:
     """Numerator of L with the delay, (K, m), at the frequencies `omega` (K, m) of the points `rows` (K,)."""
-    value = evaluate(loop.transfer.numerator[rows], 1j * omega)
+    value = evaluate(loop.transfer.numerator[rows], np.asarray(1j * omega, dtype=complex))
     return np.asarray(value * np.exp(-1j * omega * loop.delay[rows][:, None]))
 
 
@@ -71,7 +81,7 @@ def real_axis_brackets(loop: ClosedLoop, least_width: int) -> FloatArray:
 
 def _height(loop: ClosedLoop, rows: IntArray, omega: FloatArray) -> FloatArray:
     """Im L times ``|denominator|^2``, exactly zero where it is only rounding."""
-    denominator = evaluate(loop.transfer.denominator[rows], 1j * omega)
+    denominator = evaluate(loop.transfer.denominator[rows], np.asarray(1j * omega, dtype=complex))
     height = np.imag(turned_numerator(loop, rows, omega) * np.conj(denominator))
     bound = magnitude_bound(loop.transfer.numerator[rows], omega) * magnitude_bound(
         loop.transfer.denominator[rows], omega

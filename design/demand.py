@@ -13,9 +13,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from design.course import NOISE, SAMPLED_PART
+from design.extremes import NOISE, largest_magnitudes
 from design.graded import GradedStates
-from design.interpolant import crossings, interval_integrals, local_maxima, sign_changes, windows
+from design.interpolant import crossings, interval_integrals, sign_changes, windows
 from design.loop import Loop
 from design.response import Response
 from model.arrays import BoolArray, FloatArray, GridArrays, IntArray
@@ -88,7 +88,7 @@ def actuator_demands(loop: Loop, response: Response, actuators: tuple[str, ...])
     rows = _output_indices(response, actuators)
     with np.errstate(over="ignore", invalid="ignore"):
         signals = _signals(response, rows)
-        peaks = _peaks(signals)
+        peaks = largest_magnitudes(signals)
         squares = _mean_squares(response.graded, signals)
         work = _work(response.graded, signals[..., _POWER, :, :], peaks[..., _POWER])
         step = np.abs(signals[..., _DEFLECTION, 0, 0] - loop.offset[..., rows[:, _DEFLECTION]])
@@ -133,22 +133,6 @@ def _signals(response: Response, indices: IntArray) -> FloatArray:
     signals[..., :_POWER, :, :] = linear.reshape(*grid, count, _POWER, mesh.blocks, mesh.intervals + 1)
     np.multiply(signals[..., _TORQUE, :, :], signals[..., _RATE, :, :], out=signals[..., _POWER, :, :])
     return signals
-
-
-def _peaks(signals: FloatArray) -> FloatArray:
-    """(*G, a, 5) largest magnitudes of signals (*G, a, 5, S, m+1) between and at the samples."""
-    blocks, samples = signals.shape[-2:]
-    size = np.abs(signals)
-    top = np.max(size, axis=(-2, -1))
-    peaks: FloatArray = top.reshape(-1)
-    found = local_maxima(
-        size.reshape(-1, blocks, samples),
-        SAMPLED_PART * peaks,
-        NOISE * peaks,
-        signed=signals.reshape(-1, blocks, samples),
-    )
-    np.maximum.at(peaks, found.row // blocks, found.value)
-    return peaks.reshape(top.shape)
 
 
 def _mean_squares(mesh: GradedStates, signals: FloatArray) -> FloatArray:

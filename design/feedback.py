@@ -18,7 +18,6 @@ from design.polynomials import power_of_two_scale
 from design.transfer import Transfer, response, transfer
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
 
-
 AnyArray = TypeVar("AnyArray", FloatArray, ComplexArray)
 
 
@@ -71,7 +70,7 @@ def closed_loop(loop: SisoLoop) -> ClosedLoop:
     regular = np.abs(poles.real).min(axis=-1) > 1e-12 * np.abs(poles).max(axis=-1)
     if not regular.all():
         closed, b, poles = (_replaced(v, regular, w) for v, w in ((closed, -np.eye(n)), (b, 0.0), (poles, -1.0)))
-        no_loop = (scaled.numerator, 0.0), (scaled.denominator, np.poly(-np.ones(n)))
+        no_loop = (scaled.numerator, 0.0), (scaled.denominator, np.poly(-np.ones(n)).astype(float))
         scaled = Transfer(*(_replaced(v, regular, w) for v, w in no_loop))
     return ClosedLoop(closed, b, c, scaled, poles, scale, loop.delay * scale, regular)
 
@@ -84,7 +83,7 @@ def complementary(
     loop: ClosedLoop, rows: IntArray, omega: FloatArray, delayed: bool
 ) -> tuple[ComplexArray, ComplexArray]:
     """T and dT/dw (K,) at the frequencies `omega` (K,) of the points `rows` (K,), from the matrices."""
-    at = response(loop.A[rows], loop.b[rows], loop.c[rows], 1j * omega[:, None])
+    at = response(loop.A[rows], loop.b[rows], loop.c[rows], np.asarray(1j * omega[:, None], dtype=complex))
     value, slope = at.value[:, 0], 1j * at.slope[:, 0]
     if not delayed:
         return value, slope

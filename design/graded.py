@@ -105,7 +105,7 @@ def graded_states(generator: FloatArray, poles: ComplexArray, duration: float) -
 def _double(z: FloatArray, transitions: list[FloatArray], known: int) -> None:
     """Fill samples known..2 known - 1 of each block from the known ones, with that block's transition."""
     transposed = np.stack(transitions, axis=-3).swapaxes(-1, -2)
-    z[..., known : 2 * known, :] = z[..., :known, :] @ transposed
+    np.matmul(z[..., :known, :], transposed, out=z[..., known : 2 * known, :])
 
 
 def _block_steps(duration: float, intervals: int, blocks: int) -> FloatArray:

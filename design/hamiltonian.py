@@ -45,17 +45,18 @@ def eigenvectors_or_nan(matrix: FloatArray) -> tuple[ComplexArray, ComplexArray]
             nan = np.full(matrix.shape, np.nan, dtype=complex)
             return nan[:, 0], nan
     else:
-        return values, vectors
+        # numpy gives real arrays where every eigenvalue of the batch happens to be real.
+        return values.astype(complex, copy=False), vectors.astype(complex, copy=False)
     halves = [eigenvectors_or_nan(half) for half in np.array_split(matrix, 2)]
     return np.concatenate([h[0] for h in halves]), np.concatenate([h[1] for h in halves])
 
 
 def solve_or_nan(matrix: Matrices, right: Matrices) -> Matrices:
     """``matrix^-1 right`` (N, n, k), nan at singular points: numpy would raise for the whole batch."""
+    solution = np.full_like(right, np.nan)
     try:
-        return np.linalg.solve(matrix, right)
+        solution[:] = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:
         regular = np.linalg.slogdet(matrix)[0] != 0
-    solution = np.full(right.shape, np.nan, dtype=right.dtype)
-    solution[regular] = np.linalg.solve(matrix[regular], right[regular])
+        solution[regular] = np.linalg.solve(matrix[regular], right[regular])
     return solution

@@ -22,8 +22,8 @@ _FIT: FloatArray = np.asarray(
     np.linalg.inv(np.vander(np.linspace(-1.0, 1.0, POINTS), increasing=True)), dtype=np.float64
 )
 _NEWTON_PASSES = 8
-#: A Newton step this short [samples] was the last one.
-_CLOSE = 1e-9
+#: After a Newton step this short [samples] the next one would be of the order of its square.
+_CLOSE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Polynomials:
 
     def value(self, s: FloatArray) -> FloatArray:
         """(E,) values at s [samples]."""
-        return _sum_of_powers(self.coefficients, (s - self.origin) / _HALF)
+        return _sum(self.coefficients, _powers((s - self.origin) / _HALF, len(self.coefficients)))
 
     def derivative(self) -> Polynomials:
         """Derivatives with respect to s [1/sample]."""
@@ -62,20 +62,21 @@ class Polynomials:
         """(E,) integrals over s from low to high [samples]."""
         powers = np.arange(1, self.coefficients.shape[0] + 1)[:, None] / _HALF
         primitive = np.concatenate([np.zeros((1, self.origin.size)), self.coefficients / powers])
-        ends = [_sum_of_powers(primitive, (s - self.origin) / _HALF) for s in (low, high)]
-        return np.asarray(ends[1] - ends[0])
+        whole = Polynomials(primitive, self.origin)
+        return whole.value(high) - whole.value(low)
 
     def root(self, low: FloatArray, high: FloatArray, start: FloatArray) -> FloatArray:
         """(E,) where each one crosses zero in [low, high]; `start` where its ends have the same sign.
 
         Newton's method held in a shrinking bracket: a step that leaves it is replaced by the middle.
         """
-        slope = self.derivative()
+        slope = self.derivative().coefficients
         below = self.value(low) < 0.0
         crosses = below != (self.value(high) < 0.0)
         s = start
         for _ in range(_NEWTON_PASSES):
-            value, change = self.value(s), slope.value(s)
+            powers = _powers((s - self.origin) / _HALF, len(self.coefficients))
+            value, change = _sum(self.coefficients, powers), _sum(slope, powers[:-1])
             before = (value < 0.0) == below
             low, high = np.where(before, s, low), np.where(before, high, s)
             step = np.where(crosses, value / np.where(change == 0.0, np.inf, change), 0.0)
@@ -86,11 +87,20 @@ class Polynomials:
         return s
 
 
-def _sum_of_powers(coefficients: FloatArray, u: FloatArray) -> FloatArray:
-    """(E,) values of polynomials (P, E) at u (E,)."""
-    powers = np.empty(coefficients.shape)
-    powers[0], powers[1:] = 1.0, u
-    np.multiply.accumulate(powers, axis=0, out=powers)
+def _powers(u: FloatArray, count: int) -> FloatArray:
+    """(count, E) powers 0, 1, ... of u (E,), twice as many in each pass."""
+    powers = np.empty((count, u.size))
+    powers[0], known, factor = 1.0, 1, u
+    while known < count:
+        more = min(known, count - known)
+        np.multiply(powers[:more], factor, out=powers[known : known + more])
+        known += more
+        factor = factor * factor
+    return powers
+
+
+def _sum(coefficients: FloatArray, powers: FloatArray) -> FloatArray:
+    """(E,) values of polynomials."""
     return np.asarray(np.einsum("pe,pe->e", coefficients, powers))
 
 
@@ -135,23 +145,34 @@ def local_maxima(
     Extremes, rows counted over B S; no value is below the sample it was found from
     """
     blocks, samples = signal.shape[-2:]
-    flat = signal.reshape(-1)
-    index = np.flatnonzero(signal >= floor[:, None, None])
+    index = np.flatnonzero(_tops_of_blocks(signal, floor))
     row, k = np.divmod(index, samples)
     # The neighbour across the joint of two blocks is two places off: the joint is there twice.
     back = np.where(k > 0, 1, np.where(row % blocks > 0, 2, 0))
     ahead = np.where(k < samples - 1, 1, np.where(row % blocks < blocks - 1, 2, 0))
+    flat = signal.reshape(-1)
     here, before, after = flat[index], flat[index - back], flat[index + ahead]
     stands = (here >= before) & (here >= after) & (here - np.minimum(before, after) > noise[row // blocks])
-    index, row, here, at = index[stands], row[stands], here[stands], k[stands].astype(float)
+    index, row, at = index[stands], row[stands], k[stands].astype(float)
+    here, before, after = here[stands], before[stands], after[stands]
     rows = (signal if signed is None else signed).reshape(-1, samples)
     curve = windows(rows, row, at)
     if signed is not None:
         curve = curve.times(np.sign(signed.reshape(-1)[index]))
-    place = curve.derivative().root(np.maximum(at - 1.0, 0.0), np.minimum(at + 1.0, samples - 1.0), at)
+    low, high = np.maximum(at - 1.0, 0.0), np.minimum(at + 1.0, samples - 1.0)
+    vertex = at + 0.5 * (after - before) / (2.0 * here - before - after)
+    place = curve.derivative().root(low, high, np.clip(vertex, low, high))
     value = curve.value(place)
     better = value > here
     return Extremes(row, np.where(better, place, at), np.where(better, value, here))
+
+
+def _tops_of_blocks(signal: FloatArray, floor: FloatArray) -> BoolArray:
+    """(B, S, m+1) mask of the samples that reach the floor and exceed their neighbours in their block."""
+    tops = signal >= floor[:, None, None]
+    tops[..., 1:] &= signal[..., 1:] >= signal[..., :-1]
+    tops[..., :-1] &= signal[..., :-1] >= signal[..., 1:]
+    return np.asarray(tops)
 
 
 def crossings(block: FloatArray, row: IntArray, before: IntArray, level: FloatArray) -> FloatArray:

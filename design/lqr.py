@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from design.outcome import Outcome, Outcomes
-from design.return_difference import return_difference_min
+from design.regulator import finite
+from design.return_difference import return_difference
 from design.riccati import RiccatiSolution, solve_riccati
 from design.solvability import Solvability, solvability
 from design.tracking import (
@@ -26,7 +27,7 @@ from design.weights import (
     check_weights,
     weight_matrices,
 )
-from model.arrays import BoolArray, FloatArray, GridArrays
+from model.arrays import FloatArray, GridArrays
 from model.linear_model import LinearModel
 
 #: How far below 1 rounding may bring the return difference of an optimal gain.
@@ -104,10 +105,9 @@ def design_lqr(model: LinearModel, controller: LqrController, outcomes: Outcomes
     check_weights(weights.Q, weights.R, weights.N)
     if outcomes is None:
         outcomes = Outcomes.all_ok(model.A.shape[:-2])
+    known = finite(model.A) & finite(model.B)
     outcomes = outcomes.failing(
-        ~(np.isfinite(model.A).all(axis=(-2, -1)) & np.isfinite(model.B).all(axis=(-2, -1))),
-        Outcome.NOT_CERTIFIED,
-        lambda index: "the linear model holds numbers that are not finite",
+        ~known, Outcome.NOT_CERTIFIED, lambda index: "the linear model holds numbers that are not finite"
     )
     rest = steady_state(model, controller.tab_allocation)
     outcomes = outcomes.failing(
@@ -135,101 +135,66 @@ def _check_order(weights: ExplicitWeights, plant: TrackingPlant, model: LinearMo
 
 
 def _gains(plant: TrackingPlant, weights: ExplicitWeights, rest: SteadyState, outcomes: Outcomes) -> LqrDesign:
-    """Solve where the outcome is ok, judge, and spread the results over the grid."""
+    """Solve where the outcome is ok, judge, and keep the numbers of the points that pass."""
     ok = outcomes.ok
-    A, B = plant.A[ok], plant.B[ok]
-    solution = solve_riccati(A, B, weights.Q, weights.R, weights.N)
-    outcomes = _without_certificate(outcomes, ok, solution, A, B, weights)
-    certified = solution.take(solution.certified)
-    A, B = A[solution.certified], B[solution.certified]
-    largest = np.linalg.eigvals(A - B @ certified.K).real.max(axis=-1)
-    difference = return_difference_min(A, B, certified.K, weights.R, KALMAN_TOLERANCE)
+    solution = solve_riccati(plant.A[ok], plant.B[ok], weights.Q, weights.R, weights.N).spread(ok)
+    outcomes = _without_certificate(outcomes, solution, plant, weights)
     solved = outcomes.ok
-    growth, kalman = _spread(largest, solved), _spread(difference, solved)
+    A, B, K = plant.A[solved], plant.B[solved], solution.K[solved]
+    growth, kalman = np.full(ok.shape, np.nan), np.full(ok.shape, np.nan)
+    difference = return_difference(A, B, K, weights.R, KALMAN_TOLERANCE)
+    growth[solved], kalman[solved] = difference.poles.real.max(axis=-1), difference.smallest
     outcomes = outcomes.failing(
-        solved & ~(growth < 0),
+        ~(growth < 0),
         Outcome.NOT_CERTIFIED,
         lambda index: f"the closed loop has an eigenvalue with real part {growth[index]:.6g} 1/s",
     )
     if weights.N is None:
         outcomes = outcomes.failing(
-            solved & ~(kalman >= 1.0 - KALMAN_TOLERANCE),
+            ~(kalman >= 1.0 - KALMAN_TOLERANCE),
             Outcome.NOT_CERTIFIED,
-            lambda index: f"the return difference falls to {kalman[index]:.9g}; an optimal gain keeps it at 1 or more",
+            lambda index: f"the return difference falls to {kalman[index]:.9g}; an optimal gain keeps it at 1",
         )
-    K = _spread(certified.K, solved)
-    return _kept(
-        LqrDesign(
-            K=K,
-            N=feed_forward(K, rest),
-            X=_spread(certified.X, solved),
-            residual=_spread(certified.residual, solved),
-            largest_real_part=growth,
-            return_difference_min=kalman,
-            outcomes=outcomes,
-        )
+    design = LqrDesign(
+        K=solution.K,
+        N=feed_forward(solution.K, rest),
+        X=solution.X,
+        residual=solution.residual,
+        largest_real_part=growth,
+        return_difference_min=kalman,
+        outcomes=outcomes,
     )
+    kept = outcomes.ok
+    if np.array_equal(kept, solution.certified):
+        return design
+    return replace(design.take(kept).spread(kept), outcomes=outcomes)
 
 
 def _without_certificate(
-    outcomes: Outcomes,
-    ok: BoolArray,
-    solution: RiccatiSolution,
-    A: FloatArray,
-    B: FloatArray,
-    weights: ExplicitWeights,
+    outcomes: Outcomes, solution: RiccatiSolution, plant: TrackingPlant, weights: ExplicitWeights
 ) -> Outcomes:
-    """Outcome of the points with no certified solution: infeasible with the mode that forbids one, or not certified."""
-    failed = ~solution.certified
+    """Infeasible with the mode that forbids a solution, or not certified, where there is no certificate."""
+    failed = outcomes.ok & ~solution.certified
     if not np.any(failed):
         return outcomes
-    why = solvability(A[failed], B[failed], weights.Q, weights.R, weights.N)
-    _refuse_blind_weights(why, failed, weights)
-    where = ok.copy()
-    where[ok] = failed
-    reasons = np.full(ok.shape, None, dtype=object)
-    reasons[where] = why.reasons
-    unsolvable = np.asarray(reasons != None, dtype=bool)  # noqa: E711
+    why = solvability(plant.A[failed], plant.B[failed], weights.Q, weights.R, weights.N)
+    if np.array_equal(failed, outcomes.ok):
+        _refuse_blind_weights(why, weights)
+    reasons = why.spread(failed).reasons
+    unsolvable = np.array(reasons, dtype=bool)
     outcomes = outcomes.failing(unsolvable, Outcome.INFEASIBLE, lambda index: str(reasons[index]))
-    residual, growth = _spread(solution.residual, ok), _spread(solution.largest_real_part, ok)
     return outcomes.failing(
-        where,
+        failed,
         Outcome.NOT_CERTIFIED,
         lambda index: (
-            f"no certified solution of the Riccati equation: relative residual {residual[index]:.3g}, "
-            f"largest real part {growth[index]:.6g} 1/s; the weights or the model are too ill-conditioned"
+            f"no certified solution of the Riccati equation: relative residual {solution.residual[index]:.3g}, "
+            f"largest real part {solution.largest_real_part[index]:.6g} 1/s; the problem is too ill-conditioned"
         ),
     )
 
 
-def _refuse_blind_weights(why: Solvability, failed: BoolArray, weights: ExplicitWeights) -> None:
-    """Refuse the request when the weights miss a mode on the axis at every point that could be designed."""
-    blind = why.stabilisable & ~why.observable_on_axis
-    if np.all(failed) and np.all(blind):
+def _refuse_blind_weights(why: Solvability, weights: ExplicitWeights) -> None:
+    """Refuse the request when no point can be designed because the weights miss a mode on the axis."""
+    if np.all(why.stabilisable & ~why.observable_on_axis):
         matrix: Literal["Q", "N"] = "Q" if weights.N is None else "N"
         raise WeightsRefused(matrix, complex(why.unobserved[0]), str(why.reasons[0]))
-
-
-def _kept(design: LqrDesign) -> LqrDesign:
-    """The design with every number removed at the points that are not ok."""
-    ok = design.outcomes.ok
-
-    def where_ok(values: FloatArray) -> FloatArray:
-        return np.where(ok.reshape(*ok.shape, *[1] * (values.ndim - ok.ndim)), values, np.nan)
-
-    return LqrDesign(
-        K=where_ok(design.K),
-        N=where_ok(design.N),
-        X=where_ok(design.X),
-        residual=where_ok(design.residual),
-        largest_real_part=where_ok(design.largest_real_part),
-        return_difference_min=where_ok(design.return_difference_min),
-        outcomes=design.outcomes,
-    )
-
-
-def _spread(values: FloatArray, where: BoolArray) -> FloatArray:
-    """Values of the points of a mask (P, ...), put back on its grid (*G, ...); nan elsewhere."""
-    spread = np.full((*where.shape, *values.shape[1:]), np.nan)
-    spread[where] = values
-    return spread

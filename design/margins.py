@@ -75,7 +75,7 @@ def margins(loop: SisoLoop) -> Margins:
     # Where there is no crossover the column picked is nan, and says so.
     nearest = np.argmin(_without_nan(np.abs(phase)), axis=-1)[:, None]
     phase_margin, crossover = (np.take_along_axis(v, nearest, axis=-1)[:, 0] for v in (phase, unity.omega))
-    values = (
+    values: tuple[FloatArray, ...] = (
         ratio,
         gain.omega * closed.scale[:, None],
         _decibels(np.where(ratio > 1.0, ratio, np.inf).min(axis=-1)),
@@ -89,13 +89,15 @@ def margins(loop: SisoLoop) -> Margins:
         peak.sensitivity,
     )
     stable = _stable(closed, unity)
-    return Margins(*(_where_stable(v, stable).reshape(*loop.gain.shape, *v.shape[1:]) for v in values))
+    if not stable.all():
+        values = tuple(_where(stable, v) for v in values)
+    return Margins(*(v.reshape((*loop.gain.shape, *v.shape[1:])) for v in values))
 
 
 def _phase(closed: ClosedLoop, unity: Crossings) -> FloatArray:
     """Angle from -1 to L with its delay at the gain crossovers (N, M) [rad], in (-pi, pi]."""
     turn = np.exp(-1j * unity.omega * closed.delay[:, None])
-    return np.angle(-open_loop_value(unity.value) * turn)
+    return np.asarray(np.angle(-open_loop_value(unity.value) * turn))
 
 
 def _stable(closed: ClosedLoop, unity: Crossings) -> BoolArray:
@@ -111,7 +113,7 @@ def _stable(closed: ClosedLoop, unity: Crossings) -> BoolArray:
     visits = np.floor((omega * closed.delay[:, None] - lag) / TURN) + 1.0
     pairs = np.where(np.isnan(omega), 0.0, falling * np.maximum(visits, 0.0)).sum(axis=-1)
     right = (closed.poles.real > 0.0).sum(axis=-1) + 2.0 * pairs
-    return closed.regular & (right == 0.0)
+    return np.asarray(closed.regular & (right == 0.0))
 
 
 def _without_nan(values: FloatArray) -> FloatArray:
@@ -124,5 +126,5 @@ def _decibels(ratio: FloatArray) -> FloatArray:
         return 20.0 * np.log10(ratio)
 
 
-def _where_stable(values: FloatArray, stable: BoolArray) -> FloatArray:
+def _where(stable: BoolArray, values: FloatArray) -> FloatArray:
     return np.where(stable.reshape(-1, *(1,) * (values.ndim - 1)), values, np.nan)

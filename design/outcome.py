@@ -37,7 +37,9 @@ class Outcomes(GridArrays):
     @classmethod
     def all_ok(cls, shape: tuple[int, ...]) -> Outcomes:
         """Every point of a grid of this shape is ok."""
-        return cls(np.full(shape, Outcome.OK, dtype=object), np.full(shape, None, dtype=object))
+        codes = np.empty(shape, dtype=object)
+        codes.fill(Outcome.OK)  # not np.full, which makes plain strings of the members
+        return cls(codes, np.full(shape, None, dtype=object))
 
     @property
     def ok(self) -> BoolArray:

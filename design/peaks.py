@@ -9,11 +9,16 @@ import numpy as np
 from design.crossovers import positive_roots
 from design.delayed import search_grid, turned_numerator
 from design.feedback import ClosedLoop, complementary
-from design.polynomials import evaluate, squared_magnitude, taylor
+from design.polynomials import evaluate, powers, squared_magnitude, with_derivatives
 from model.arrays import FloatArray, GridArrays
 
 #: A peak is proved to be the largest to within this part of its square.
 RESOLUTION = 1e-8
+#: Two or three passes prove a peak; more than this are only for loops that are next to unstable.
+LARGEST_NUMBER_OF_PASSES = 30
+#: With a delay: how many local maxima of the grid are looked into. Next to the edge of stability a narrow
+#: peak can lie between two points of the grid and show as a low one.
+SUMMITS = 16
 #: Where the search begins besides the poles: squares of frequencies over the loop's scale, 0 included.
 SAMPLES = np.concatenate([[0.0], np.geomspace(1e-3, 4.0, 24) ** 2])
 
@@ -58,12 +63,14 @@ def _peak(loop: ClosedLoop) -> FloatArray:
     x, level = _best(P, Q, np.tile(start, (2, 1)))
     level = np.maximum(level, 1.0)
     active = np.arange(x.size)
-    while active.size:
+    for _ in range(LARGEST_NUMBER_OF_PASSES):
         above = level[active] * (1.0 + RESOLUTION)
         edges = np.sort(positive_roots(P[active] - above[:, None] * Q[active]), axis=-1)
         middles = 0.5 * (edges[:, 1:] + edges[:, :-1])
-        open_ = ~np.isnan(middles).all(axis=-1)
-        active, above, middles = active[open_], above[open_], middles[open_]
+        exceeded = ~np.isnan(middles).all(axis=-1)
+        if not exceeded.any():
+            break
+        active, above, middles = active[exceeded], above[exceeded], middles[exceeded]
         found, height = _best(P[active], Q[active], np.where(np.isnan(middles), 0.0, middles))
         better = height > above
         active = active[better]
@@ -76,41 +83,42 @@ def _best(P: FloatArray, Q: FloatArray, start: FloatArray) -> tuple[FloatArray, 
     heights = evaluate(P, start) / evaluate(Q, start)
     best = np.argmax(heights, axis=-1)[:, None]
     start, height = (np.take_along_axis(v, best, axis=-1)[:, 0] for v in (start, heights))
-    both, x = np.stack([P, Q]), start
+    both, x = with_derivatives(np.stack([P, Q])), start
     for _ in range(3):
-        (p, q), (dp, dq), (ddp, ddq) = taylor(both, x)
+        (p, dp, ddp), (q, dq, ddq) = np.moveaxis(both @ powers(x, P.shape[-1])[..., None], 1, -2)[..., 0]
         with np.errstate(divide="ignore", invalid="ignore"):
             x = x - (dp * q - p * dq) / (ddp * q - p * ddq)
         x = np.where(np.isfinite(x) & (x > 0.0), x, start)
-    sharpened = np.divide(*evaluate(both, np.stack([x, x])[..., None])[..., 0])
-    return np.where(sharpened > height, x, start), np.maximum(sharpened, height)
+    p, q = (both[:, :, 0] * powers(x, P.shape[-1])).sum(axis=-1)
+    return np.where(p > height * q, x, start), np.maximum(p / q, height)
 
 
 def _delayed_peak(loop: ClosedLoop, opposite: bool) -> FloatArray:
     """Frequency (N,) of the largest ``|1 + L|^-1``, or ``|1 - L| / |1 + L|``, with the delay.
 
-    The four highest points of the grid are each looked at again, between their neighbours, ever closer.
+    The highest summits of the grid are each looked at again, between their neighbours, ever closer.
     """
     grid = search_grid(loop)
     every = np.arange(grid.shape[0])
     height = _delayed_height(loop, grid, opposite)
     padded = np.pad(height, ((0, 0), (1, 1)), constant_values=-np.inf)
     summit = (height >= padded[:, :-2]) & (height >= padded[:, 2:])
-    place = np.argsort(np.where(summit, -height, np.inf), axis=-1)[:, :4]
+    place = np.argsort(np.where(summit, -height, np.inf), axis=-1)[:, :SUMMITS]
     low = grid[every[:, None], np.maximum(place - 1, 0)]
     high = grid[every[:, None], np.minimum(place + 1, grid.shape[1] - 1)]
     fractions = np.linspace(0.0, 1.0, 17)
-    for _ in range(8):
+    for _ in range(6):
         near = low[..., None] + (high - low)[..., None] * fractions
         height = _delayed_height(loop, near.reshape(every.size, -1), opposite).reshape(near.shape)
         best = height.argmax(axis=-1)[..., None]
         low, high = (np.take_along_axis(near, np.clip(best + side, 0, 16), axis=-1)[..., 0] for side in (-1, 1))
     middle = 0.5 * (low + high)
-    best = _delayed_height(loop, middle, opposite).argmax(axis=-1)
-    return middle[every, best]
+    best = _delayed_height(loop, middle, opposite).argmax(axis=-1)[:, None]
+    return np.take_along_axis(middle, best, axis=-1)[:, 0]
 
 
 def _delayed_height(loop: ClosedLoop, omega: FloatArray, opposite: bool) -> FloatArray:
-    denominator = evaluate(loop.transfer.denominator, 1j * omega)
+    denominator = evaluate(loop.transfer.denominator, np.asarray(1j * omega, dtype=complex))
     numerator = turned_numerator(loop, np.arange(omega.shape[0]), omega)
-    return np.abs((denominator - numerator if opposite else denominator) / (denominator + numerator))
+    top = denominator - numerator if opposite else denominator
+    return np.asarray(np.abs(top / (denominator + numerator)))

@@ -33,14 +33,21 @@ def evaluate(p: FloatArray, s: Points) -> Points:
     return result
 
 
-def taylor(p: FloatArray, x: FloatArray) -> FloatArray:
-    """Value and first two derivatives of (*G, n+1) at one real point each (*G,), stacked: (3, *G)."""
-    value, slope, bend = (np.zeros(p.shape[:-1]) for _ in range(3))
-    for i in range(p.shape[-1]):
-        bend = bend * x + slope
-        slope = slope * x + value
-        value = value * x + p[..., i]
-    return np.stack([value, slope, 2.0 * bend])
+def with_derivatives(p: FloatArray) -> FloatArray:
+    """Polynomial and its first two derivatives, (*G, n+1) gives (*G, 3, n+1), all of the same length."""
+    power = np.arange(p.shape[-1] - 1, -1, -1.0)
+    result = np.zeros((*p.shape[:-1], 3, p.shape[-1]))
+    result[..., 0, :] = p
+    result[..., 1, 1:] = (p * power)[..., :-1]
+    result[..., 2, 2:] = (p * power * (power - 1.0))[..., :-2]
+    return result
+
+
+def powers(x: FloatArray, length: int) -> FloatArray:
+    """``x^(length-1) .. x, 1`` (*G, length): times the coefficients and summed, the value of a polynomial."""
+    factors = np.ones((*x.shape, length))
+    factors[..., 1:] = x[..., None]
+    return np.multiply.accumulate(factors, axis=-1)[..., ::-1]
 
 
 def magnitude_bound(p: FloatArray, s: ComplexArray | FloatArray) -> FloatArray:

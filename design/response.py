@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import expm
 
+from design.extremes import largest_magnitudes
 from design.final_value import final_values
 from design.graded import GradedStates, graded_states
 from design.loop import Loop
@@ -64,6 +65,12 @@ class Response(GridArrays):
     def final_outputs(self) -> FloatArray:
         """(*G, o) values the outputs settle to, from the DC gain; nan where they do not settle."""
         return final_values(self.generator, self.rows, self.poles)
+
+    @cached_property
+    def peaks(self) -> FloatArray:
+        """(*G, o) largest magnitude of each output, trim included, between and at the samples."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return largest_magnitudes(self.graded.signals(self.rows))
 
     @cached_property
     def graded(self) -> GradedStates:
@@ -136,7 +143,7 @@ def _powers_of(transition: FloatArray, samples: int) -> FloatArray:
     known, power = 1, transition
     while known < samples:
         more = min(known, samples - known)
-        z[..., known : known + more, :] = z[..., :more, :] @ power.swapaxes(-1, -2)
+        np.matmul(z[..., :more, :], power.swapaxes(-1, -2), out=z[..., known : known + more, :])
         known += more
         if known < samples:
             power = power @ power

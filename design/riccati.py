@@ -254,15 +254,15 @@ def _agree(problem: RegulatorProblem, one: _Candidate, other: _Candidate) -> Boo
     gain, difference = _norm(F.mT @ one.X), _norm(F.mT @ (one.X - other.X))
     damping = np.max(np.abs(one.poles - other.poles) / np.abs(one.poles), axis=-1)
     same = one.sound & other.sound & (difference <= SAME_GAIN * gain) & (damping <= SAME_DAMPING)
-    if not same.any():
-        return same
+    if not np.any(same):
+        return np.asarray(same)
     solvable = problem_solvability(problem)
     distance = np.minimum(solvable.control_distance, solvable.observation_distance)
     return np.asarray(same & (distance >= CLEARLY_SOLVABLE))
 
 
 def _scipy_candidate(equation: RiccatiEquation) -> FloatArray:
-    """scipy's solution at one point (n, n), symmetric; nan where it raises."""
+    """Solution by scipy at one point (n, n), symmetric; nan where it raises."""
     inputs = equation.F.shape[-1]
     try:
         X = scipy.linalg.solve_continuous_are(equation.A, equation.F, equation.Q, np.eye(inputs))

@@ -8,7 +8,8 @@ With ``R > 0`` and ``Q - N R^-1 N' >= 0`` the stabilising solution exists exactl
 An unobservable mode in the right half plane is no obstacle: the stabilising solution mirrors it into the left
 half plane, at the least cost of control. One on the axis mirrors into itself, so no feedback of this kind moves it.
 Both conditions are rank tests (Popov, Belevitch, Hautus) in balanced coordinates, with A scaled to unit size,
-the columns of B and the rows of Q to unit length: how strongly an input acts or a state is weighted does not matter, only whether.
+the columns of B and the rows of Q to unit length: how strongly an input acts or a state is weighted does not
+matter, only whether.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ def _observation_distance(equation: RiccatiEquation, eigenvalues: ComplexArray) 
     """Smallest singular value of ``[jwI - A; Q]`` at the points of the axis below the eigenvalues, and that jw."""
     length = np.linalg.norm(equation.Q, axis=2, keepdims=True)
     seen = equation.Q / np.where(length > 0, length, 1.0)
-    axis = 1j * eigenvalues.imag
+    axis = np.asarray(1j * eigenvalues.imag, dtype=complex)
     return _worst(_smallest_singular(axis, equation.A.mT, seen.mT), axis)
 
 

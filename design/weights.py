@@ -121,7 +121,9 @@ def check_weights(Q: FloatArray, R: FloatArray, N: FloatArray | None = None, tol
     _check_semidefinite("Q", Q, Q, tolerance)
     if N is not None:
         _check_matrix("N", N, (n, m))
-        _check_semidefinite("N", Q - N @ np.linalg.solve(R, N.T), Q, tolerance)
+        with np.errstate(over="ignore", invalid="ignore"):
+            reduced = Q - N @ np.linalg.solve(R, N.T)
+        _check_semidefinite("N", reduced, Q, tolerance)
 
 
 def _check_matrix(name: WeightName, matrix: FloatArray, shape: tuple[int, int]) -> None:
@@ -138,10 +140,10 @@ def _check_matrix(name: WeightName, matrix: FloatArray, shape: tuple[int, int]) 
 
 def _check_definite(R: FloatArray) -> None:
     """R > 0, with the margin that its inverse needs."""
-    lowest = _lowest_eigenvalue(R)
     diagonal = np.diag(R)
     if np.all(diagonal > 0) and _lowest_eigenvalue(_scaled(R, diagonal)) > len(R) * np.finfo(float).eps:
         return
+    lowest = _lowest_eigenvalue(R)
     raise WeightsRefused(
         "R", lowest, f"R is not positive definite: its smallest eigenvalue is {lowest:.6g}; every input needs a weight"
     )
@@ -149,24 +151,26 @@ def _check_definite(R: FloatArray) -> None:
 
 def _check_semidefinite(name: WeightName, matrix: FloatArray, Q: FloatArray, tolerance: float) -> None:
     """``matrix >= 0`` up to rounding in the size of Q's diagonal."""
-    text = "Q" if name == "Q" else "Q - N R^-1 N'"
-    lowest = _lowest_eigenvalue(matrix)
     diagonal = np.diag(Q)
     scaled = _scaled(matrix, np.where(diagonal > 0, diagonal, 1.0))
-    if np.all(diagonal >= 0) and np.all(np.isfinite(scaled)) and _lowest_eigenvalue(scaled) >= -tolerance:
+    if np.all(diagonal >= 0) and _lowest_eigenvalue(scaled) >= -tolerance:
         return
+    text = "Q" if name == "Q" else "Q - N R^-1 N'"
+    lowest = _lowest_eigenvalue(matrix)
     raise WeightsRefused(name, lowest, f"{text} is not positive semidefinite: its smallest eigenvalue is {lowest:.6g}")
 
 
 def _scaled(matrix: FloatArray, diagonal: FloatArray) -> FloatArray:
     unit = 1.0 / np.sqrt(diagonal)
-    return np.asarray(matrix * unit[:, None] * unit)
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        return np.asarray(matrix * unit[:, None] * unit)
 
 
 def _lowest_eigenvalue(matrix: FloatArray) -> float:
-    """Smallest eigenvalue of a symmetric matrix; no diagonal entry is below it, whatever rounding says."""
-    with np.errstate(all="ignore"):
-        symmetric = 0.5 * (matrix + matrix.T)
-    if not np.all(np.isfinite(symmetric)):
+    """Smallest eigenvalue of a symmetric matrix: never above its smallest diagonal entry, whatever rounding says.
+
+    nan where the matrix overflowed.
+    """
+    if not np.isfinite(matrix).all():
         return float("nan")
-    return float(min(np.linalg.eigvalsh(symmetric)[0], np.min(np.diag(symmetric))))
+    return float(min(np.linalg.eigvalsh(0.5 * matrix + 0.5 * matrix.T)[0], matrix.diagonal().min()))

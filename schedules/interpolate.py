@@ -78,9 +78,7 @@ def interpolate(schedule: GainSchedule, coordinates: Sequence[Floats]) -> Interp
     brackets = [_bracket(axis, x) for axis, x in zip(schedule.axes, points, strict=True)]
     vertices = list(_vertices(brackets, shape))
     ok = schedule.outcomes.ok
-    gains = tuple(
-        Gain(g.name, g.unit, _weighted(np.where(ok, g.values, np.nan), vertices)) for g in schedule.gains
-    )
+    gains = tuple(Gain(g.name, g.unit, _weighted(np.where(ok, g.values, np.nan), vertices)) for g in schedule.gains)
     clipped = np.zeros(shape, dtype=bool)
     for bracket in brackets:
         clipped = np.asarray(clipped | bracket.clipped)

@@ -156,18 +156,25 @@ def _kept(gains: tuple[Gain, ...], outcomes: Outcomes) -> tuple[Gain, ...]:
     return tuple(Gain(g.name, g.unit, np.where(outcomes.ok, g.values, np.nan)) for g in gains)
 
 
-_STATE_UNITS = {"dt": "rad", "da": "rad", "dt_rate": "rad/s", "da_rate": "rad/s", "int_a": "rad s"}
+#: Unit of a torque gain on each state.
+_TORQUE_GAIN_UNITS = {
+    "dt": "N m/rad",
+    "da": "N m/rad",
+    "dt_rate": "N m s/rad",
+    "da_rate": "N m s/rad",
+    "int_a": "N m/(rad s)",
+}
 
 
 def _matrix_gains(loop: Loop, inputs: tuple[str, ...]) -> tuple[Gain, ...]:
     """``K_<input>_<state>`` and ``N_<input>_<reference>`` of a state-feedback loop."""
     feedback = [
-        Gain(f"K_{u}_{x}", f"N m/({_STATE_UNITS[x]})", loop.K[..., i, j])
+        Gain(f"K_{u}_{x}", _TORQUE_GAIN_UNITS[x], loop.K[..., i, j])
         for i, u in enumerate(inputs)
         for j, x in enumerate(loop.states)
     ]
     forward = [
-        Gain(f"N_{u}_{r}", "N m/(rad)", loop.N[..., i, j])
+        Gain(f"N_{u}_{r}", "N m/rad", loop.N[..., i, j])
         for i, u in enumerate(inputs)
         for j, r in enumerate(loop.references)
     ]

@@ -46,7 +46,7 @@ def answer(
     """The answer with its entity tag; 304 and no body when the client has these very bytes already."""
     tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache", **(headers or {})}
-    if status == 200 and _has(request.headers.get("if-none-match", ""), tag):
+    if request.method == "GET" and _has(request.headers.get("if-none-match", ""), tag):
         return Response(status_code=304, headers=headers)
     return Response(body, status_code=status, media_type=media_type, headers=headers)
 

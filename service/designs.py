@@ -11,12 +11,13 @@ from typing import TypeVar
 import numpy as np
 import orjson
 
-from design.weights import WeightsRefused
+from design.lqr import LqrController, design_lqr
+from design.weights import ExplicitWeights, WeightsRefused
 from model.arrays import FloatArray
 from schedules.analysis import PlantEnvelope, analyse
 from schedules.run import DesignedController, DesignedEnvelope, run
 from schedules.schedule import Provenance
-from schedules.study import PlantStudy
+from schedules.study import PlantStudy, Study
 from service import study_of
 from service.answering import encode
 from service.envelopes import Envelopes
@@ -30,6 +31,12 @@ from service.version import code_version
 
 #: Largest relative change of a gain between a stored design and the same design made again.
 SAME_GAINS = 1e-9
+
+#: What weights must be to define a regulator.
+WORKING_WEIGHTS = (
+    "R symmetric positive definite; Q and Q - N R^-1 N' symmetric positive semidefinite, and Q sees every mode "
+    "that does not decay by itself"
+)
 
 StudyKind = TypeVar("StudyKind", bound=PlantStudy)
 Result = TypeVar("Result")
@@ -119,10 +126,26 @@ def _asked(study: StudyKind, function: Callable[[StudyKind], Result]) -> Result:
     try:
         return function(study)
     except WeightsRefused:
-        raise
+        raise _weights_refusal(study) from None
     except (ValueError, ArithmeticError) as error:
         log.warning("a study was refused by the model", exc_info=error)
         raise InvalidRequest(f"the model cannot answer for these numbers: {error}") from error
+
+
+def _weights_refusal(study: PlantStudy) -> InvalidRequest:
+    """The refusal of weights that cannot work, pointing at the matrix of the controller that has them."""
+    plant = analyse(study)
+    for place, wanted in enumerate(study.controllers if isinstance(study, Study) else ()):
+        if not isinstance(wanted, LqrController):
+            continue
+        try:
+            design_lqr(plant.model, wanted, plant.outcomes)
+        except WeightsRefused as refused:
+            explicit = isinstance(wanted.weights, ExplicitWeights)
+            pointer = f"/controllers/{place}/weights" + (f"/{refused.matrix}" if explicit else "")
+            field = FieldRefusal(pointer, f"{refused.matrix}: {refused.reason}", "SI", WORKING_WEIGHTS)
+            return InvalidRequest(f"{pointer}: {field.detail}", field)
+    raise AssertionError("weights were refused by a run and by none of its controllers")
 
 
 def _stored(ident: str, request: DesignRequest, envelope: DesignedEnvelope) -> StoredDesign:

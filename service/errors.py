@@ -13,7 +13,6 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
-from design.weights import WeightsRefused
 from service import refusals
 from service.pointers import field_refusal
 from service.refusals import FieldRefusal

@@ -6,16 +6,21 @@ documentation does.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
+from service.allowed import Schema, allowed_by, dereferenced, is_null
 from service.refusals import FieldRefusal
 
-Schema = dict[str, Any]
-#: Comparisons of JSON Schema, in the words of an allowed range.
-_BOUNDS = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
-_SIZES = {"minLength": "at least {} characters", "maxLength": "at most {} characters"}
-_COUNTS = {"minItems": "at least {} items", "maxItems": "at most {} items"}
+#: What is wrong, where pydantic's own words are about Python.
+_DETAILS = {
+    "missing": "this field is required",
+    "none_required": "only null is taken by this version",
+    "string_unicode": "not valid Unicode: a lone surrogate in text, or in the name of a field here",
+    "model_type": "must be a JSON object",
+    "model_attributes_type": "must be a JSON object",
+    "list_type": "must be a JSON array",
+    "finite_number": "must be a finite number",
+}
 
 
 class Place:
@@ -40,122 +45,77 @@ class Place:
         self.schema = self._resolved(self.schema.get("properties", {}).get(part, {}))
         self.unit = self.schema.get("unit")
 
+    def follow(self, pointer: str) -> None:
+        """Go along a JSON pointer from here."""
+        for part in pointer.split("/")[1:]:
+            self.step(int(part) if part.isdigit() else part)
+
+    @property
     def allowed(self) -> str | None:
         """What the schema here takes, in words."""
         return allowed_by(self.schema, self._openapi)
 
+    @property
     def fields(self) -> str:
         """The fields an object here may have."""
         return "fields " + ", ".join(self.schema.get("properties", {}))
 
+    @property
+    def kinds(self) -> str:
+        """The values of the field that tells the branches of a union apart."""
+        return "one of " + ", ".join(self.schema.get("discriminator", {}).get("mapping", {}))
+
     def _resolved(self, schema: Schema) -> Schema:
-        """The schema itself, behind references and beside null."""
-        schema, outer = _dereferenced(schema, self._openapi), schema
-        choices = [s for s in schema.get("anyOf", []) if s.get("type") != "null"]
+        """The schema itself, behind references and beside null; its unit may stand outside."""
+        inner = dereferenced(schema, self._openapi)
+        choices = [branch for branch in inner.get("anyOf", []) if not is_null(branch)]
         if len(choices) == 1:
-            schema = self._resolved(choices[0]) | {"nullable": True}
-        unit = outer.get("unit")
-        return schema | {"unit": unit} if unit else schema
+            inner = self._resolved(choices[0]) | {"nullable": True}
+        return inner | {"unit": schema["unit"]} if "unit" in schema else inner
 
     def _branch(self, part: str | int) -> Schema | None:
         """The branch of a union that a tag names: by its discriminator, or by its JSON type."""
-        branches = [self._resolved(s) for s in self.schema.get("oneOf", [])]
         field = self.schema.get("discriminator", {}).get("propertyName")
-        for branch in branches:
+        for branch in (self._resolved(branch) for branch in self.schema.get("oneOf", [])):
             tag = branch.get("properties", {}).get(field, {}).get("const") if field else branch.get("type")
             if tag == part:
                 return branch
         return None
 
 
-def _dereferenced(schema: Schema, openapi: Schema) -> Schema:
-    while "$ref" in schema:
-        name = schema["$ref"].rsplit("/", 1)[-1]
-        schema = openapi["components"]["schemas"][name]
-    return schema
-
-
-def allowed_by(schema: Schema, openapi: Schema) -> str | None:
-    """What a schema takes, in words: ``>= 0.001 and <= 100``, ``one of none, prandtl_glauert``."""
-    if branches := schema.get("oneOf") or [s for s in schema.get("anyOf", []) if s.get("type") != "null"]:
-        words = [allowed_by(_dereferenced(s, openapi), openapi) or "" for s in branches]
-        text = "; or ".join(word for word in words if word)
-    else:
-        text = _of_type(schema)
-    if schema.get("nullable") or any(s.get("type") == "null" for s in schema.get("anyOf", [])):
-        text = f"{text}, or null" if text else "null"
-    return text or None
-
-
-def _of_type(schema: Schema) -> str:
-    if "const" in schema:
-        return f"only {schema['const']}"
-    if "enum" in schema:
-        return "one of " + ", ".join(str(value) for value in schema["enum"])
-    kind = schema.get("type")
-    if kind in ("number", "integer"):
-        bounds = [f"{sign} {schema[key]:g}" for key, sign in _BOUNDS.items() if key in schema]
-        return (
-            " and ".join([kind, *bounds])
-            if not bounds
-            else ("an integer " * (kind == "integer")) + " and ".join(bounds)
-        )
-    if kind == "string":
-        sizes = [text.format(schema[key]) for key, text in _SIZES.items() if key in schema]
-        return ", ".join(["text", *sizes, *([f"matching {schema['pattern']}"] if "pattern" in schema else [])])
-    if kind == "array":
-        return ", ".join(["a list", *(text.format(schema[key]) for key, text in _COUNTS.items() if key in schema)])
-    if kind == "object":
-        return "an object with the fields " + ", ".join(schema.get("properties", {}))
-    return {"boolean": "true or false", "null": "null"}.get(str(kind), "")
-
-
 def field_refusal(error: dict[str, Any], openapi: Schema, operation: Schema) -> FieldRefusal:
-    """The refusal of one field from one of pydantic's validation errors."""
+    """The refusal of one field from one of pydantic's validation errors.
+
+    Parameters
+    ----------
+    error : one of ``RequestValidationError.errors()``
+    openapi : the OpenAPI document
+    operation : the part of it that describes the operation asked for
+    """
     where, *parts = error["loc"]
-    place = _start(where, parts, openapi, operation)
     kind, context = error["type"], error.get("ctx", {})
-    unknown = kind == "extra_forbidden"
-    for part in parts[:-1] if unknown else parts:
+    place = Place(openapi, _root(where, operation))
+    for part in parts[:-1]:
         place.step(part)
-    if unknown:
-        allowed = place.fields()
-        place.step(parts[-1])
-        return FieldRefusal(place.pointer, "unknown field", None, allowed)
+    known = place.fields
+    for part in parts[-1:]:
+        place.step(part)
+    if kind == "extra_forbidden":
+        return FieldRefusal(place.pointer, "unknown field", None, known)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        tags = _tags(place)
         pointer = f"{place.pointer}/{context['discriminator'].strip(chr(39))}"
-        return FieldRefusal(pointer, "missing or unknown kind", None, f"one of {tags}")
-    detail, allowed = _detail(kind, error, context), context.get("allowed") or place.allowed()
-    for part in context.get("at", "").split("/")[1:]:
-        place.step(int(part) if part.isdigit() else part)
+        return FieldRefusal(pointer, "missing or unknown kind", None, place.kinds)
+    detail = _DETAILS.get(kind) or str(context.get("detail") or error["msg"].replace("Input should", "must"))
+    allowed = context.get("allowed") or place.allowed
+    place.follow(context.get("at", ""))
     return FieldRefusal(place.pointer, detail, place.unit, allowed)
 
 
-def _start(where: Any, parts: Sequence[str | int], openapi: Schema, operation: Schema) -> Place:
-    """Root of the walk: the request body, or an object whose properties are the parameters."""
+def _root(where: Any, operation: Schema) -> Schema:
+    """Schema of the request body, or of an object whose properties are the parameters."""
     if where == "body":
         content = operation.get("requestBody", {}).get("content", {})
-        return Place(openapi, content.get("application/json", {}).get("schema", {}))
+        schema: Schema = content.get("application/json", {}).get("schema", {})
+        return schema
     named = {p["name"]: p["schema"] for p in operation.get("parameters", []) if p["in"] == where}
-    return Place(openapi, {"type": "object", "properties": named})
-
-
-def _tags(place: Place) -> str:
-    return ", ".join(place.schema.get("discriminator", {}).get("mapping", {}))
-
-
-def _detail(kind: str, error: dict[str, Any], context: dict[str, Any]) -> str:
-    """What is wrong, in our words where pydantic's are about Python."""
-    ours = {
-        "missing": "this field is required",
-        "none_required": "only null is taken by this version",
-        "string_unicode": "not valid Unicode: a lone surrogate in text, or in the name of a field here",
-        "model_type": "must be a JSON object",
-        "model_attributes_type": "must be a JSON object",
-        "list_type": "must be a JSON array",
-        "finite_number": "must be a finite number",
-    }
-    if kind == "refused":
-        return str(context["detail"])
-    return ours.get(kind, str(error["msg"]).replace("Input should", "must"))
+    return {"type": "object", "properties": named}

@@ -48,3 +48,49 @@ def tab_actuator():
 
     limits = ActuatorLimits(np.deg2rad(25.0), np.deg2rad(400.0), 2.0)
     return Actuator(2.0 * np.pi * 40.0, 0.7, 2.0 * np.pi * 80.0, limits=limits)
+
+
+@pytest.fixture(scope="session")
+def wind_tunnel_study():
+    """The example wind_tunnel as a study: nf, pf and lqr over the grid of 2 x 4."""
+    from design.classical import ClassicalController
+    from design.lqr import LqrController
+    from design.specs import Spec
+    from design.weights import BrysonWeights
+    from model.actuators import Actuator, ActuatorLimits
+    from model.examples import WIND_TUNNEL_TRIM, wind_tunnel
+    from schedules.study import GridRequest, Reference, Study
+
+    system = wind_tunnel()
+    rad = np.deg2rad
+    tab = Actuator(2.0 * np.pi * 40.0, 0.7, 2.0 * np.pi * 80.0, limits=ActuatorLimits(rad(25.0), rad(400.0), 2.0))
+    specs = (
+        Spec("damping_ratio", "min", 0.5),
+        Spec("gain_margin", "min", 6.0),
+        Spec("phase_margin", "min", np.pi / 4),
+        Spec("settling_time", "max", 0.6),
+        Spec("overshoot", "max", 0.2),
+    )
+    bryson = BrysonWeights(
+        aileron=rad(2.0), aileron_rate=rad(200.0), tab=rad(10.0), tab_rate=rad(400.0),
+        aileron_integral=rad(0.1), tab_torque=0.5, aileron_torque=2.0,
+    )  # fmt: skip
+    return Study(
+        geometry=system.geometry, inertia=system.inertia, aerodynamics=system.aerodynamics, trim=WIND_TUNNEL_TRIM,
+        grid=GridRequest((0.0, 3000.0), "dynamic_pressure", (245.0, 551.25, 980.0, 1531.25)),
+        name="wind_tunnel", tab_actuator=tab, aileron_actuator=Actuator(limits=ActuatorLimits(rad(25.0), None, 10.0)),
+        reference=Reference(rad(10.0), 1.0),
+        controllers=(
+            ClassicalController("nf", "negative_feedback", specs, 2.0 * np.pi * 100.0),
+            ClassicalController("pf", "positive_feedback", (Spec("damping_ratio", "min", 0.4),)),
+            LqrController("lqr", bryson),
+        ),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def wind_tunnel_envelope(wind_tunnel_study):
+    """The example wind_tunnel, designed."""
+    from schedules.run import run
+
+    return run(wind_tunnel_study)

@@ -143,9 +143,7 @@ def _read_table(lines: list[str]) -> _Table:
 
 
 def _units_of(table: _Table, units: Any) -> dict[str, str]:
-    if not isinstance(units, dict) or any(
-        not isinstance(units.get(name), str) for name in table.axes + table.gains
-    ):
+    if not isinstance(units, dict) or any(not isinstance(units.get(name), str) for name in table.axes + table.gains):
         raise ValueError("the line 'units' must name the unit of every axis and gain")
     return units
 

@@ -54,9 +54,7 @@ def read_json(content: bytes) -> GainSchedule:
     require_format(document)
     axes = tuple(_axis(item, f"/axes/{i}") for i, item in enumerate(_list(document.get("axes"), "/axes")))
     shape = tuple(len(axis.values) for axis in axes)
-    gains = tuple(
-        _gain(item, shape, f"/gains/{i}") for i, item in enumerate(_list(document.get("gains"), "/gains"))
-    )
+    gains = tuple(_gain(item, shape, f"/gains/{i}") for i, item in enumerate(_list(document.get("gains"), "/gains")))
     return schedule_from(document, axes, gains, _outcomes(document, shape))
 
 

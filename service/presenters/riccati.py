@@ -13,5 +13,5 @@ def riccati_document(design: LqrDesign, index: tuple[int, ...]) -> dict[str, Any
     return {
         "residual": float(here.residual),
         "largest_real_part": float(here.largest_real_part),
-        "return_difference_min": float(here.return_difference),
+        "return_difference_min": float(here.return_difference_min),
     }

@@ -21,7 +21,7 @@ from service.presenters.requirements import reference_document, requirements_doc
 from service.presenters.response import response_document
 from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.designs import DesignId
-from service.schedule_of import schedule_of
+from schedules.schedule_of import schedule_of
 from service.schemas.controller import InterpolatedGains, Requirements
 from service.schemas.controller import Response as StepResponse
 from service.schemas.wire import PARAMETERS

@@ -12,7 +12,7 @@ from service.designs import controller_of
 from service.openapi import problems
 from service.refusals import NotFound
 from service.routes.designs import DesignId
-from service.schedule_of import schedule_of
+from schedules.schedule_of import schedule_of
 from service.state import HEAVY, DesignsHere
 
 router = APIRouter(prefix="/v1/designs/{id}/schedules", tags=["schedules"])
@@ -39,11 +39,10 @@ def download_schedule(
     designs: DesignsHere,
 ) -> Response:
     """The gain schedule of one controller, with its outcomes, units, law and rule between the points."""
-    envelope = designs.envelope(ident)
-    chosen = controller_of(envelope, controller)
     if suffix not in FILE_FORMATS:
         raise NotFound(f"there is no schedule file {suffix[:80]!a}; there are {', '.join(FILE_FORMATS)}")
-    schedule = schedule_of(envelope, chosen, designs.provenance(ident))
+    envelope = designs.envelope(ident)
+    schedule = schedule_of(envelope, controller_of(envelope, controller), designs.provenance(ident))
     headers = download_headers(envelope.study.name, controller, suffix=suffix)
     content = write_schedule(schedule, suffix)
     return answer(request, content, media_type=FILE_FORMATS[suffix].media_type, headers=headers)

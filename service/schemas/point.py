@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from service.schemas.design import Grid, GridAir, GridOutcomes, GridReasons, Kind, OutcomeCode, EnvelopeWarning
+from service.schemas.design import EnvelopeWarning, Grid, GridAir, GridOutcomes, GridReasons, Kind, OutcomeCode
 from service.schemas.wire import Answer
 
 Matrix = list[list[float]]

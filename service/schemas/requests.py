@@ -84,6 +84,17 @@ class HingeMomentsRequest(Request):
     )
 
     @model_validator(mode="after")
+    def no_mach_number(self) -> Self:
+        """Refuse a correction that needs a Mach number, which this request does not have."""
+        if self.aerodynamics.compressibility != "none":
+            raise refusal(
+                "hinge moments alone are incompressible: there is no Mach number to correct them for",
+                "only none",
+                at="/aerodynamics/compressibility",
+            )
+        return self
+
+    @model_validator(mode="after")
     def pressure_away_from_hinges(self) -> Self:
         """Refuse the pressure at a hinge, where thin-aerofoil theory makes it infinite."""
         hinges = (self.geometry.aileron_hinge, self.geometry.tab_hinge)

@@ -28,7 +28,9 @@ def main() -> None:
     warnings.simplefilter("ignore")
     versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "control"))
     slycot = "with slycot" if find_spec("slycot") else "without slycot"
-    print(f"Python {platform.python_version()}, {versions} ({slycot}), one BLAS thread, {arguments.repeats} pairs a row")
+    print(
+        f"Python {platform.python_version()}, {versions} ({slycot}), one BLAS thread, {arguments.repeats} pairs a row"
+    )
     print(f"{'job':<42} {'peer':<28} {'ours ms':>9} {'peer ms':>9} {'ratio':>7} {'spread':>15} {'goal':>6}")
     for row in rows():
         if arguments.only not in row.job:

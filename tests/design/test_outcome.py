@@ -25,3 +25,4 @@ def test_outcomes_are_read_only_and_the_original_is_untouched():
     original.failing(np.array([True, False, False]), Outcome.INFEASIBLE, lambda index: "x")
     assert original.ok.all()
     assert not original.codes.flags.writeable
+    assert original.codes[0] is Outcome.OK
