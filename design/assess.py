@@ -51,11 +51,19 @@ def assess(loop: Loop, reference: FloatArray, duration: float, samples: int = 50
     response = step_response(loop, reference, duration, samples)
     return Assessment(
         poles=poles(loop.closed),
-        margins=tuple(margins(loop.cut(name)) for name in loop.inputs),
+        margins=_margins_of_cuts(loop),
         step=step_metrics(loop, response, "da", reference),
         demand=actuator_demands(loop, response, loop.inputs),
         actuators=loop.inputs,
     )
+
+
+def _margins_of_cuts(loop: Loop) -> tuple[Margins, ...]:
+    """Margins at every actuator input; one batch where the inputs' delays allow it."""
+    if len(set(loop.delay)) == 1:
+        stacked = margins(loop.cuts())
+        return tuple(stacked.take(i) for i in range(len(loop.inputs)))
+    return tuple(margins(loop.cut(name)) for name in loop.inputs)
 
 
 def achieved(assessment: Assessment, quantity: str) -> FloatArray | None:

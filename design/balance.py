@@ -32,27 +32,32 @@ def balance_exponents(A: FloatArray, F: FloatArray, Q: FloatArray) -> IntArray:
     """
     h = _log2_hamiltonian(A, F, Q)
     n = A.shape[-1]
-    d = np.zeros((len(A), 2 * n))
-    columns = np.max(h, axis=1)
+    d = np.zeros((2 * n, len(A)))
+    columns = np.max(h, axis=0)
     # The row of state i has the entries of the column of its costate n + i; zero ones cannot be balanced.
-    scalable = np.isfinite(columns[:, n:] - columns[:, :n])
+    scalable = np.isfinite(columns[n:] - columns[:n])
     for _ in range(MAX_SWEEPS):
-        gap = np.where(scalable, columns[:, n:] - columns[:, :n], 0.0)
-        moving = np.max(np.abs(gap), axis=1, keepdims=True) > BALANCED
+        gap = np.where(scalable, columns[n:] - columns[:n], 0.0)
+        moving = np.abs(gap).max(axis=0) > BALANCED
         if not moving.any():
             break
         # A quarter, as all the states move at once: half would overshoot where they are coupled.
         step = 0.25 * gap * moving
-        d[:, :n] += step
-        d[:, n:] -= step
-        columns = np.max(h - d[:, :, None], axis=1) + d
-    size = np.max(columns, axis=1, keepdims=True)
+        d[:n] += step
+        d[n:] -= step
+        columns = np.max(h - d[:, None], axis=0) + d
+    with np.errstate(divide="ignore"):
+        poles = np.log2(np.abs(np.diagonal(A, axis1=1, axis2=2)).max(axis=1))
+    size = np.maximum(columns.max(axis=0), poles)
     size[~np.isfinite(size)] = 0.0
-    return np.asarray(np.rint(np.concatenate([d[:, :n], size], axis=1)), dtype=np.int64)
+    return np.asarray(np.rint(np.concatenate([d[:n], size[None]])).T, dtype=np.int64)
 
 
 def _log2_hamiltonian(A: FloatArray, F: FloatArray, Q: FloatArray) -> FloatArray:
-    """log2 |H| (N, 2n, 2n) without the diagonal of A, which no scaling moves; -inf where H is zero."""
+    """log2 |H| (2n, 2n, N) without the diagonal of A, which no scaling moves; -inf where H is zero.
+
+    The points come last, where maxima over rows are several times faster.
+    """
     n = A.shape[-1]
     size = np.frexp(np.max(np.abs(F), axis=(-2, -1), initial=0.0, keepdims=True))[1]
     F = np.ldexp(F, -size)
@@ -63,7 +68,8 @@ def _log2_hamiltonian(A: FloatArray, F: FloatArray, Q: FloatArray) -> FloatArray
     H[:, n:, n:] = A.mT
     diagonal = np.arange(2 * n)
     H[:, diagonal, diagonal] = 0.0
+    h = np.abs(H.transpose(1, 2, 0), order="C")
     with np.errstate(divide="ignore"):
-        h = np.log2(np.abs(H))
-    h[:, :n, n:] += 2 * size
+        np.log2(h, out=h)
+    h[:n, n:] += 2 * size[:, 0, 0]
     return h

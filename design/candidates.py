@@ -77,13 +77,17 @@ class _FrequencyResponse:
         row = np.arange(k.size)
         low, high = np.log(self.x[row, k]), np.log(self.x[row, k + 1])
         f_low, f_high = (f(self.L[row, i], self.T[row, i]) for i in (k, k + 1))
-        for _ in range(3):
+        held = np.zeros(k.size)  # which end stayed where it was the last time: -1 the low one, +1 the high one
+        for _ in range(4):
             u = low - f_low * (high - low) / np.where(f_high == f_low, np.inf, f_high - f_low)
             L, T = self._exact(np.exp(u))
             f_u = f(L, T)
             left = f_u * f_low > 0
-            low, f_low = np.where(left, u, low), np.where(left, f_u, f_low)
-            high, f_high = np.where(left, high, u), np.where(left, f_high, f_u)
+            # Illinois: an end held twice counts half, or the other one would creep.
+            f_high = np.where(left, np.where(held > 0, 0.5 * f_high, f_high), f_u)
+            f_low = np.where(left, f_u, np.where(held < 0, 0.5 * f_low, f_low))
+            low, high = np.where(left, u, low), np.where(left, high, u)
+            held = np.where(left, 1.0, -1.0)
         return np.exp(u), L
 
     def gain_margin_db(self) -> FloatArray:

@@ -25,7 +25,7 @@ OFFSETS = np.array([-8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0])
 
 
 def search_grid(loop: ClosedLoop) -> FloatArray:
-    """Frequencies (N, W), rising from 0, in units of the loop's scale."""
+    """Frequencies (N, W), strictly rising from 0, in units of the loop's scale."""
     ratio, count = loop.transfer, loop.poles.shape[-1]
     features = np.concatenate([loop.poles, roots(ratio.denominator), roots(ratio.numerator)], axis=-1)
     features = np.where(np.isnan(features), 0.0, features)
@@ -42,7 +42,11 @@ def search_grid(loop: ClosedLoop) -> FloatArray:
         loud[:, None] * steps,
         np.clip(near.reshape(near.shape[0], -1), 0.0, top[:, None]),
     )
-    return np.sort(np.concatenate(parts, axis=-1), axis=-1)
+    grid = np.sort(np.concatenate(parts, axis=-1), axis=-1)
+    # A point that is there twice is of no use: its neighbours would not enclose anything. It moves up.
+    twice = np.diff(grid, axis=-1, prepend=-1.0) == 0.0
+    beyond = top[:, None] * np.linspace(1.01, 1.1, grid.shape[-1])
+    return np.sort(np.where(twice, beyond, grid), axis=-1)
 
 
 def _last_above(loop: ClosedLoop, level: float) -> FloatArray:

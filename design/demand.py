@@ -91,19 +91,18 @@ def actuator_demands(loop: Loop, response: Response, actuators: tuple[str, ...])
         peaks = largest_magnitudes(signals)
         squares = _mean_squares(response.graded, signals)
         work = _work(response.graded, signals[..., _POWER, :, :], peaks[..., _POWER])
-        step = np.abs(signals[..., _DEFLECTION, 0, 0] - loop.offset[..., rows[:, _DEFLECTION]])
-        jumps = step > _JUMP * peaks[..., _DEFLECTION]
-        rate_jumps = jumps | (np.abs(signals[..., _RATE, 0, 0]) > _JUMP * peaks[..., _RATE])
+        jumps = np.abs(signals[..., :3, 0, 0] - loop.offset[..., rows]) > _JUMP * peaks[..., :3]
+    angle_jumps, rate_jumps = jumps[..., _DEFLECTION], jumps[..., _RATE] | jumps[..., _DEFLECTION]
     holding = np.abs(response.final_outputs[..., rows[:, _TORQUE]])
     return tuple(
         ActuatorDemand(
             peak_torque=peaks[..., i, _TORQUE],
             rms_torque=np.sqrt(squares[..., i, 0]),
             holding_torque=holding[..., i],
-            peak_rate=np.where(jumps[..., i], np.inf, peaks[..., i, _RATE]),
+            peak_rate=np.where(angle_jumps[..., i], np.inf, peaks[..., i, _RATE]),
             peak_acceleration=np.where(rate_jumps[..., i], np.inf, peaks[..., i, _ACCELERATION]),
             peak_deflection=peaks[..., i, _DEFLECTION],
-            peak_power=np.where(jumps[..., i], np.inf, peaks[..., i, _POWER]),
+            peak_power=np.where(angle_jumps[..., i], np.inf, peaks[..., i, _POWER]),
             rms_power=np.sqrt(squares[..., i, 1]),
             energy_out=np.maximum(0.5 * (work.gross + work.net)[..., i], 0.0),
             energy_back=np.maximum(0.5 * (work.gross - work.net)[..., i], 0.0),

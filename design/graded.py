@@ -12,19 +12,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
+from design.transition import transition
 from model.arrays import ComplexArray, FloatArray, GridArrays
 
 #: Largest |pole| times sample step of a mode that is alive [rad].
 RESOLUTION = 0.125
 #: Sample intervals of a block and number of blocks where nothing asks for more: every grid whose modes
 #: these resolve has the same mesh, so a point's numbers do not depend on its neighbours.
-INTERVALS, BLOCKS = 32, 10
+INTERVALS, BLOCKS = 32, 8
 #: A mode needs RESOLUTION for no longer than it takes to decay; intervals of a block, times damping ratio.
 FADING = 16.0
 #: Bounds of the mesh; reached only by a fast mode of next to no damping, or by one beyond all actuators.
-LARGEST_INTERVALS, LARGEST_BLOCKS = 4096, 29
+LARGEST_INTERVALS, LARGEST_BLOCKS = 4096, 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,27 +85,28 @@ def graded_states(generator: FloatArray, poles: ComplexArray, duration: float) -
     intervals = _needed_intervals(poles, duration)
     blocks = _needed_blocks(poles, duration, intervals)
     passes = intervals.bit_length() - 1
+    size = generator.shape[-1]
+    chain = np.empty((*generator.shape[:-2], passes + blocks, size, size))
+    z = np.zeros((*generator.shape[:-2], blocks, intervals + 1, size))
     with np.errstate(over="ignore", invalid="ignore"):
-        chain = [expm(generator * _block_steps(duration, intervals, blocks)[0])]
-        while len(chain) < passes + blocks:
-            chain.append(chain[-1] @ chain[-1])
+        chain[..., 0, :, :] = transition(generator, float(_block_steps(duration, intervals, blocks)[0]))
+        for j in range(1, passes + blocks):
+            np.matmul(chain[..., j - 1, :, :], chain[..., j - 1, :, :], out=chain[..., j, :, :])
         # chain[j] is the transition over 2^j steps of block 0. Block i > 0 has the step of chain[i - 1] and
         # starts where the transition of chain[passes + i - 1] leads, whose last column is exp(M t) [0, 1].
-        z = np.zeros((*generator.shape[:-2], blocks, intervals + 1, generator.shape[-1]))
         z[..., 0, 0, -1] = 1.0
-        for i in range(1, blocks):
-            z[..., i, 0, :] = chain[passes + i - 1][..., -1]
+        z[..., 1:, 0, :] = chain[..., passes:-1, :, -1]
         z[..., :-1, -1, :] = z[..., 1:, 0, :]
-        z[..., -1, -1, :] = chain[passes + blocks - 1][..., -1]
+        z[..., -1, -1, :] = chain[..., -1, :, -1]
         for j in range(passes):
-            _double(z, [chain[max(i - 1, 0) + j] for i in range(blocks)], 2**j)
+            _double(z[..., :1, :, :], chain[..., j : j + 1, :, :], 2**j)
+            _double(z[..., 1:, :, :], chain[..., j : j + blocks - 1, :, :], 2**j)
     return GradedStates(z, float(duration))
 
 
-def _double(z: FloatArray, transitions: list[FloatArray], known: int) -> None:
+def _double(z: FloatArray, transitions: FloatArray, known: int) -> None:
     """Fill samples known..2 known - 1 of each block from the known ones, with that block's transition."""
-    transposed = np.stack(transitions, axis=-3).swapaxes(-1, -2)
-    np.matmul(z[..., :known, :], transposed, out=z[..., known : 2 * known, :])
+    np.matmul(z[..., :known, :], transitions.swapaxes(-1, -2), out=z[..., known : 2 * known, :])
 
 
 def _block_steps(duration: float, intervals: int, blocks: int) -> FloatArray:
@@ -126,4 +127,4 @@ def _needed_blocks(poles: ComplexArray, duration: float, intervals: int) -> int:
     """Blocks: the first one samples the fastest mode at RESOLUTION."""
     turns = float(np.max(np.abs(poles), initial=0.0)) * duration / (RESOLUTION * intervals)
     needed = 1 + int(np.ceil(np.log2(max(turns, 1.0))))
-    return min(max(BLOCKS, needed), LARGEST_BLOCKS)
+    return min(max(BLOCKS, needed + needed % 2), LARGEST_BLOCKS)

@@ -57,6 +57,7 @@ def solve_or_nan(matrix: Matrices, right: Matrices) -> Matrices:
     try:
         solution[:] = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:
-        regular = np.linalg.slogdet(matrix)[0] != 0
+        with np.errstate(all="ignore"):
+            regular = np.linalg.slogdet(matrix)[0] != 0
         solution[regular] = np.linalg.solve(matrix[regular], right[regular])
     return solution

@@ -114,6 +114,19 @@ class Loop(GridArrays):
         ones = np.ones(self.A.shape[:-2])
         return SisoLoop(name, A, self.B[..., i], self.K[..., i, :], ones, +1, self.delay[i])
 
+    def cuts(self) -> SisoLoop:
+        """All cuts in one stack (m, *G, ...), in the order of the inputs, for inputs of the same delay.
+
+        Raises
+        ------
+        ValueError : the inputs have different delays
+        """
+        if len(set(self.delay)) != 1:
+            raise ValueError("cuts of inputs with different delays cannot be stacked")
+        each = [self.cut(name) for name in self.inputs]
+        A, b, c, gain = (np.stack([getattr(cut, field) for cut in each]) for field in ("A", "b", "c", "gain"))
+        return SisoLoop("cuts", A, b, c, gain, +1, self.delay[0])
+
     def stage(self, name: str) -> SisoLoop:
         """The named loop of `stages`; KeyError when there is none."""
         for stage in self.stages:

@@ -18,11 +18,6 @@ from model.arrays import ComplexArray, FloatArray, IntArray
 Points = TypeVar("Points", FloatArray, ComplexArray)
 
 
-def derivative(p: FloatArray) -> FloatArray:
-    """``dp/ds``: (*G, n+1) gives (*G, n); the derivative of a constant has no coefficients."""
-    return p[..., :-1] * np.arange(p.shape[-1] - 1, 0, -1)
-
-
 def evaluate(p: FloatArray, s: Points) -> Points:
     """Value of (*G, n+1) at (*G, m) points, (*G, m), by Horner's rule; real for real `s`."""
     result = np.zeros_like(s)
@@ -31,6 +26,11 @@ def evaluate(p: FloatArray, s: Points) -> Points:
         result *= s
         result += p[..., i : i + 1]
     return result
+
+
+def product(p: FloatArray, q: FloatArray) -> FloatArray:
+    """``p q``: two (*G, n+1) give (*G, 2n+1)."""
+    return _bilinear(p, q, _product_table(p.shape[-1]))
 
 
 def with_derivatives(p: FloatArray) -> FloatArray:
@@ -73,6 +73,15 @@ def imaginary_cross(p: FloatArray, q: FloatArray) -> FloatArray:
 def _bilinear(p: FloatArray, q: FloatArray, table: FloatArray) -> FloatArray:
     products = p[..., :, None] * q[..., None, :]
     return np.asarray(products.reshape(*products.shape[:-2], -1) @ table)
+
+
+@cache
+def _product_table(length: int) -> FloatArray:
+    """Where the product of two coefficients goes in the product of two polynomials, (length^2, 2 length - 1)."""
+    i, j = (m.ravel() for m in np.meshgrid(np.arange(length), np.arange(length), indexing="ij"))
+    table = np.zeros((length**2, 2 * length - 1))
+    table[np.arange(length**2), i + j] = 1.0
+    return table
 
 
 @cache

@@ -36,6 +36,23 @@ class RiccatiEquation(GridArrays):
         """``F F'`` (N, n, n)."""
         return np.asarray(self.F @ self.F.mT)
 
+    def in_scale(self, matrix: FloatArray) -> FloatArray:
+        """A closed-loop matrix (N, n, n) [1/s] in the scaled states and time; its eigenvalues only scale."""
+        tau, k = self.state_exponent, self.time_exponent[:, None, None]
+        return np.asarray(np.ldexp(matrix, tau[:, None, :] - tau[:, :, None] - k))
+
+    def unscaled(self) -> RiccatiEquation:
+        """The equation in the states' own units and in seconds; what overflows there becomes infinite."""
+        tau, k = self.state_exponent, self.time_exponent[:, None, None]
+        row, column = tau[:, :, None], tau[:, None, :]
+        return RiccatiEquation(
+            A=np.ldexp(self.A, row - column + k),
+            F=np.ldexp(self.F, row + k // 2),
+            Q=np.ldexp(self.Q, k - row - column),
+            state_exponent=np.zeros_like(tau),
+            time_exponent=np.zeros_like(self.time_exponent),
+        )
+
     def solution_in_states(self, X: FloatArray) -> FloatArray:
         """X (N, n, n) of the scaled equation, in the states' own units."""
         tau = self.state_exponent
@@ -105,7 +122,7 @@ def regulator_problem(
         S=np.broadcast_to(S, (len(A), m, m)),
         cross=np.broadcast_to(cross, (len(A), m, n)),
         posed=posed,
-        equation=_scaled(reduced, F, np.broadcast_to(0.5 * (Q + Q.mT), A.shape)),
+        equation=scaled_equation(reduced, F, np.broadcast_to(0.5 * (Q + Q.mT), A.shape)),
     )
 
 
@@ -151,7 +168,8 @@ def symmetric(matrix: FloatArray) -> BoolArray:
     return np.asarray((skew <= ASYMMETRY * size) & np.isfinite(size))
 
 
-def _scaled(A: FloatArray, F: FloatArray, Q: FloatArray) -> RiccatiEquation:
+def scaled_equation(A: FloatArray, F: FloatArray, Q: FloatArray) -> RiccatiEquation:
+    """The equation of A (N, n, n), F (N, n, m), Q (N, n, n), balanced and with its Hamiltonian of order one."""
     exponents = balance_exponents(A, F, Q)
     tau, size = exponents[:, :-1], exponents[:, -1]
     k = 2 * ((size + 1) // 2)

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import expm
 
 from design.extremes import largest_magnitudes
 from design.final_value import final_values
 from design.graded import GradedStates, graded_states
 from design.loop import Loop
+from design.transition import transition
 from model.arrays import ComplexArray, FloatArray, GridArrays
 
 
@@ -88,6 +88,8 @@ def step_response(loop: Loop, reference: FloatArray, duration: float, samples: i
     duration : length of the response [s]
     samples : number of samples T, both ends included
 
+    Transport delays (``loop.delay``) are in the margins, not in this response.
+
     Returns
     -------
     Response. A loop so unstable that it leaves the range of doubles gives inf or nan there, without warning.
@@ -105,7 +107,7 @@ def step_response(loop: Loop, reference: FloatArray, duration: float, samples: i
     generator = _generator(loop, step)
     rows = _rows(loop, step)
     with np.errstate(over="ignore", invalid="ignore"):
-        z = _powers_of(expm(generator * (duration / (samples - 1))), samples)
+        z = _powers_of(transition(generator, duration / (samples - 1)), samples)
         outputs = z @ rows.swapaxes(-1, -2)
     time = np.broadcast_to(np.linspace(0.0, duration, samples), (*grid, samples))
     return Response(

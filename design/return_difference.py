@@ -85,8 +85,8 @@ def _peak_by_modes(
     inverse = np.asarray(solve_or_nan(modes, identity), dtype=np.complex128)
     condition = np.linalg.norm(modes, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2))
     left, right = K @ modes, inverse @ B
-    m = B.shape[-1]
-    residues = (left[:, :, None, :] * right.mT[:, None, :, :]).reshape(len(K), m * m, -1)
+    n, m = B.shape[-2:]
+    residues = (left[:, :, None, :] * right.mT[:, None, :, :]).reshape(len(K), m * m, n)
     transfer = residues @ _first_order(poles, omega)
     sensitivity = np.eye(m).reshape(1, m * m, 1) - transfer
     return np.max(_largest_singular(sensitivity), axis=1), condition
@@ -105,9 +105,9 @@ def _first_order(poles: ComplexArray, omega: FloatArray) -> ComplexArray:
 def _peak_by_solving(closed: FloatArray, B: FloatArray, K: FloatArray, omega: FloatArray) -> float:
     """The same peak at one point, by a linear system per frequency."""
     n, m = B.shape
-    pencil: ComplexArray = np.multiply.outer(1j * omega, np.eye(n)) - closed
-    inputs: ComplexArray = np.broadcast_to(B.astype(np.complex128), (len(omega), n, m))
-    states = solve_or_nan(pencil, inputs)
+    pencil = np.asarray(1j * omega, dtype=np.complex128)[:, None, None] * np.eye(n) - closed
+    inputs = np.broadcast_to(B.astype(np.complex128), (len(omega), n, m))
+    states: ComplexArray = solve_or_nan(pencil, inputs)
     sensitivity = np.asarray(np.eye(m) - K @ states, dtype=np.complex128)
     return float(np.max(_largest_singular(sensitivity.reshape(1, len(omega), m * m).mT)))
 
@@ -120,6 +120,6 @@ def _largest_singular(matrices: ComplexArray) -> FloatArray:
     a, b, c, d = matrices[:, 0], matrices[:, 1], matrices[:, 2], matrices[:, 3]
     square = np.sum(matrices.real**2 + matrices.imag**2, axis=1)
     determinant = a * d - b * c
-    determinant = 2.0 * np.sqrt(determinant.real**2 + determinant.imag**2)
-    gap = np.sqrt(np.maximum((square - determinant) * (square + determinant), 0.0))
+    twice = 2.0 * np.sqrt(determinant.real**2 + determinant.imag**2)
+    gap = np.sqrt(np.maximum((square - twice) * (square + twice), 0.0))
     return np.asarray(np.sqrt(0.5 * (square + gap)))

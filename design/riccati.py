@@ -135,20 +135,20 @@ def _judged(problem: RegulatorProblem, X: FloatArray) -> _Candidate:
     equation = problem.equation
     X, residual, doubt = _newton(equation, X)
     K = problem.S @ equation.feedback_in_states(X) + problem.cross
-    closed = problem.A - problem.B @ K
+    closed = equation.in_scale(problem.A - problem.B @ K)
     usable = problem.posed & finite(closed) & finite(equation.solution_in_states(X))
     if not usable.all():
         closed[~usable] = 0.0
     poles = np.sort(np.linalg.eigvals(closed).real, axis=-1)
     poles[~usable] = np.nan
-    rate = np.ldexp(_norm(equation.A - equation.G @ X), equation.time_exponent)
-    spectrum = np.linalg.eigvalsh(np.where(usable[:, None, None], X, 0.0))
+    spectrum = np.linalg.eigvalsh(X if usable.all() else np.where(usable[:, None, None], X, 0.0))
     sound = (
         usable
         & (residual <= MAX_RESIDUAL)
-        & (poles[:, -1] < -ROUNDING * rate)
+        & (poles[:, -1] < -ROUNDING * _norm(closed))
         & (spectrum[:, 0] >= -NEGATIVE * np.abs(spectrum[:, -1]))
     )
+    poles = np.ldexp(poles, equation.time_exponent[:, None])
     return _Candidate(X, K, poles, residual, sound, sound & (doubt <= MAX_DOUBT))
 
 
@@ -191,7 +191,7 @@ def _residual(equation: RiccatiEquation, X: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _norm(matrix: FloatArray) -> FloatArray:
-    entries = matrix.reshape(len(matrix), -1)
+    entries = matrix.reshape(len(matrix), matrix.shape[1] * matrix.shape[2])
     return np.asarray(np.sqrt(np.vecdot(entries, entries)))
 
 
@@ -230,10 +230,10 @@ def _symmetric_index(n: int) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
 def _second_opinion(
     problem: RegulatorProblem, first: _Candidate, solver: ObjectArray, doubtful: IntArray
 ) -> tuple[_Candidate, ObjectArray]:
-    """Candidates and solvers with the doubtful points judged again: another Newton step, and scipy."""
+    """Candidates and solvers with the doubtful points judged again: more Newton steps, and scipy."""
     problem = problem.take(doubtful)
     equation = problem.equation
-    eigen = _judged(problem, first.X[doubtful])
+    eigen = _judged(problem, _newton(equation, first.X[doubtful])[0])
     scipy_X = np.stack([_scipy_candidate(equation.take(i)) for i in range(len(doubtful))])
     other = _judged(problem, _newton(equation, scipy_X)[0])
     by_scipy = other.proved & ~eigen.proved

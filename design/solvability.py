@@ -7,9 +7,9 @@ With ``R > 0`` and ``Q - N R^-1 N' >= 0`` the stabilising solution exists exactl
 
 An unobservable mode in the right half plane is no obstacle: the stabilising solution mirrors it into the left
 half plane, at the least cost of control. One on the axis mirrors into itself, so no feedback of this kind moves it.
-Both conditions are rank tests (Popov, Belevitch, Hautus) in balanced coordinates, with A scaled to unit size,
-the columns of B and the rows of Q to unit length: how strongly an input acts or a state is weighted does not
-matter, only whether.
+Both conditions are rank tests (Popov, Belevitch, Hautus) in balanced coordinates, with A, the columns of B
+and the rows of Q scaled to unit size: how strongly an input acts or a state is weighted does not matter,
+only whether.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, Object
 
 #: A singular value below this, relative to the balanced matrices, is a loss of rank.
 RANK = 1e-12
+#: Sweeps of the balancing of a pair; each one halves what is left of 2^1000.
+PAIR_SWEEPS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +84,11 @@ def solvability(A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, N: F
 
 def problem_solvability(problem: RegulatorProblem) -> Solvability:
     """`solvability` of a problem over N points."""
-    equation = problem.equation
+    equation = problem.equation.unscaled()
     eigenvalues = np.linalg.eigvals(equation.A).astype(complex)
-    control, worst_control = _control_distance(equation, eigenvalues)
-    observation, worst_observation = _observation_distance(equation, eigenvalues)
-    rate = np.ldexp(1.0, equation.time_exponent)
-    uncontrolled, unobserved = worst_control * rate, worst_observation * rate
-    reasons = np.full(len(rate), None, dtype=object)
+    control, uncontrolled = _control_distance(equation, eigenvalues)
+    observation, unobserved = _observation_distance(equation, eigenvalues)
+    reasons = np.full(len(control), None, dtype=object)
     for i in np.flatnonzero(~problem.posed | (control <= RANK) | (observation <= RANK)):
         if not problem.posed[i]:
             reasons[i] = "R is not positive definite, Q is not symmetric, or the data are not finite"
@@ -103,37 +103,64 @@ def problem_solvability(problem: RegulatorProblem) -> Solvability:
     return Solvability(control, observation, uncontrolled, unobserved, reasons)
 
 
+def _size(matrix: FloatArray) -> FloatArray:
+    """Largest entry (N, 1, 1); 1 for a matrix of zeros."""
+    size = np.max(np.abs(matrix), axis=(1, 2), keepdims=True)
+    return np.where(size > 0, size, 1.0)
+
+
 def _rate(s: complex) -> str:
     return f"{s.real:.6g}" if s.imag == 0 else f"{s.real:.6g}{s.imag:+.6g}j"
 
 
 def _control_distance(equation: RiccatiEquation, eigenvalues: ComplexArray) -> tuple[FloatArray, ComplexArray]:
     """Smallest singular value of ``[sI - A, B]`` over the eigenvalues with ``Re s >= 0``, and that s."""
-    length = np.linalg.norm(equation.F, axis=1, keepdims=True)
-    inputs = equation.F / np.where(length > 0, length, 1.0)
-    distance = _smallest_singular(eigenvalues, equation.A, inputs)
-    size = np.max(np.abs(equation.A), axis=(1, 2))[:, None]
-    distance[eigenvalues.real < -RANK * size] = np.inf
+    distance = _rank_distance(eigenvalues, equation.A, equation.F)
+    distance[eigenvalues.real < -RANK * _size(equation.A)[:, 0]] = np.inf
     return _worst(distance, eigenvalues)
 
 
 def _observation_distance(equation: RiccatiEquation, eigenvalues: ComplexArray) -> tuple[FloatArray, ComplexArray]:
     """Smallest singular value of ``[jwI - A; Q]`` at the points of the axis below the eigenvalues, and that jw."""
-    length = np.linalg.norm(equation.Q, axis=2, keepdims=True)
-    seen = equation.Q / np.where(length > 0, length, 1.0)
     axis = np.asarray(1j * eigenvalues.imag, dtype=complex)
-    return _worst(_smallest_singular(axis, equation.A.mT, seen.mT), axis)
+    return _worst(_rank_distance(axis, equation.A.mT, equation.Q), axis)
 
 
-def _smallest_singular(s: ComplexArray, A: FloatArray, right: FloatArray) -> FloatArray:
-    """Smallest singular value of ``[sI - A, right]`` (N, n) at each of the n values s, in the size of A."""
-    n = A.shape[-1]
-    size = np.max(np.abs(A), axis=(1, 2))[:, None]
-    size = np.where(size > 0, size, 1.0)
-    pencil = (s / size)[:, :, None, None] * np.eye(n) - (A / size[:, :, None])[:, None]
-    right = np.broadcast_to(right[:, None], (*s.shape, *right.shape[1:]))
-    matrix = np.concatenate([pencil, right], axis=-1)
-    return np.asarray(np.linalg.svd(matrix, compute_uv=False)[..., -1])
+def _rank_distance(s: ComplexArray, A: FloatArray, B: FloatArray) -> FloatArray:
+    """Smallest singular value of ``[sI - A, B]`` (N, n) at each of the n values s, A of unit size."""
+    A, B = _balanced_pair(A, B)
+    size = _size(A)
+    A, B, s = A / size, B / size, s / size[:, 0]
+    pencil = s[:, :, None, None] * np.eye(A.shape[-1]) - A[:, None]
+    inputs = np.broadcast_to(B[:, None], (*s.shape, *B.shape[1:]))
+    singular = np.linalg.svd(np.concatenate([pencil, inputs], axis=-1), compute_uv=False)
+    return np.asarray(singular[..., -1])
+
+
+def _balanced_pair(A: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A and B in states where the rows of ``[A, B]`` and the columns of A are of like size, as far as can be.
+
+    The columns of B are made as large as A, so that it depends neither on the strength of the inputs nor on the
+    units of the states whether rank is lost.
+    """
+    diagonal = np.eye(A.shape[-1], dtype=bool)
+    for _ in range(PAIR_SWEEPS):
+        size = _size(A)
+        B = _unit_columns(B) * size
+        coupling = np.where(diagonal, 0.0, np.abs(A))
+        rows = np.maximum(coupling.max(axis=2), np.abs(B).max(axis=2))
+        columns = coupling.max(axis=1)
+        # Where there is nothing to compare with, the size of A serves.
+        ratio = np.where(rows > 0, rows, size[:, 0]) / np.where(columns > 0, columns, size[:, 0])
+        scale = np.exp2(np.rint(0.25 * np.log2(ratio)))[:, :, None]
+        A, B = A * scale.mT / scale, B / scale
+    return A, _unit_columns(B) * _size(A)
+
+
+def _unit_columns(B: FloatArray) -> FloatArray:
+    """The largest entry of each column becomes 1; a column of zeros stays."""
+    length = np.max(np.abs(B), axis=1, keepdims=True)
+    return B / np.where(length > 0, length, 1.0)
 
 
 def _worst(distance: FloatArray, s: ComplexArray) -> tuple[FloatArray, ComplexArray]:

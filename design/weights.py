@@ -151,9 +151,10 @@ def _check_definite(R: FloatArray) -> None:
 
 def _check_semidefinite(name: WeightName, matrix: FloatArray, Q: FloatArray, tolerance: float) -> None:
     """``matrix >= 0`` up to rounding in the size of Q's diagonal."""
-    diagonal = np.diag(Q)
+    # The larger of the two: what a cross term takes from a state without a weight counts in full.
+    diagonal = np.maximum(np.abs(np.diag(Q)), np.abs(np.diag(matrix)))
     scaled = _scaled(matrix, np.where(diagonal > 0, diagonal, 1.0))
-    if np.all(diagonal >= 0) and _lowest_eigenvalue(scaled) >= -tolerance:
+    if _lowest_eigenvalue(scaled) >= -tolerance:
         return
     text = "Q" if name == "Q" else "Q - N R^-1 N'"
     lowest = _lowest_eigenvalue(matrix)

@@ -18,6 +18,7 @@ LIMITS = {
     "max_body_bytes": "B",
     "max_grid_points": "1",
     "max_controllers": "1",
+    "max_point_designs": "1",
     "max_locus_gains": "1",
     "max_response_samples": "1",
     "max_listed_designs": "1",
@@ -57,8 +58,8 @@ def check_size(pointer: str, what: str, size: int, name: str, settings: Settings
         raise LimitExceeded(detail, FieldRefusal(pointer, f"{size} {what}", "1", f"<= {limit}"))
 
 
-def check_grid(grid: flight.Grid, settings: Settings) -> None:
-    """Refuse a grid of too many points, before any of them exists.
+def check_grid(grid: flight.Grid, settings: Settings) -> int:
+    """Refuse a grid of too many points, before any of them exists; how many there are.
 
     Raises
     ------
@@ -66,6 +67,7 @@ def check_grid(grid: flight.Grid, settings: Settings) -> None:
     """
     points = _length(grid.altitude_m) * _length(grid.speed_axis[1])
     check_size("/grid", "grid points", points, "max_grid_points", settings)
+    return points
 
 
 def check_design(request: DesignRequest, settings: Settings) -> None:
@@ -75,8 +77,10 @@ def check_design(request: DesignRequest, settings: Settings) -> None:
     ------
     LimitExceeded
     """
-    check_grid(request.grid, settings)
-    check_size("/controllers", "controllers", len(request.controllers), "max_controllers", settings)
+    points, controllers = check_grid(request.grid, settings), len(request.controllers)
+    check_size("/controllers", "controllers", controllers, "max_controllers", settings)
+    work = points * controllers
+    check_size("/grid", "grid points times controllers", work, "max_point_designs", settings)
 
 
 def check_envelope(study: PlantStudy) -> None:

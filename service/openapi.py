@@ -13,6 +13,7 @@ from service.errors import MEDIA_TYPE, STATUS, problem
 from service.examples import NAMES, example
 from service.refusals import FieldRefusal
 from service.schemas.problem import FieldProblem, Problem
+from service.units import state_units
 
 #: What a route that reads a body may refuse it for.
 BODY = (400, 413, 415, 422)
@@ -74,10 +75,12 @@ def install(app: FastAPI, example_id: Callable[[], str]) -> None:
 
 
 def _complete(path: str, method: str, operation: dict[str, Any], example_id: str) -> None:
-    """Examples of bodies and parameters, and the answer to a conditional GET."""
+    """Examples of bodies and parameters, units of parameters, and the answer to a conditional GET."""
     if method == "get":
         operation["responses"]["304"] = {"description": "Not modified: the client's `If-None-Match` names this answer"}
-    for parameter in operation.get("parameters", []):
+    parameters = operation.get("parameters", [])
+    state_units({"properties": {parameter["name"]: parameter["schema"] for parameter in parameters}})
+    for parameter in parameters:
         if parameter["name"] == "id":
             parameter["example"] = example_id
     if "requestBody" in operation:

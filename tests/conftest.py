@@ -94,3 +94,33 @@ def wind_tunnel_envelope(wind_tunnel_study):
     from schedules.run import run
 
     return run(wind_tunnel_study)
+
+
+@pytest.fixture(scope="session")
+def running_service(tmp_path_factory):
+    """Address of a service in a process of its own."""
+    import socket
+    import subprocess
+    import sys
+    import time
+    import urllib.request
+    from pathlib import Path
+
+    with socket.socket() as sock:
+        sock.bind(("127.0.0.1", 0))
+        port = sock.getsockname()[1]
+    command = [sys.executable, "-m", "service", "--port", str(port)]
+    command += ["--data-dir", str(tmp_path_factory.mktemp("data"))]
+    base = f"http://127.0.0.1:{port}"
+    with subprocess.Popen(command, cwd=Path(__file__).parents[1], stderr=subprocess.DEVNULL) as process:
+        deadline = time.monotonic() + 60
+        while True:
+            try:
+                urllib.request.urlopen(f"{base}/healthz", timeout=5).close()
+                break
+            except OSError:
+                assert process.poll() is None, "the service stopped"
+                assert time.monotonic() < deadline, "the service does not answer"
+                time.sleep(0.1)
+        yield base
+        process.terminate()

@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 from design.response import step_response
 from schedules.interpolate import interpolate
 from schedules.run import DesignedEnvelope
+from schedules.schedule_of import schedule_of
 from schedules.wire_names import axis_name
 from service.answering import answer, encode
 from service.designs import controller_of, point_with_gains
@@ -21,7 +22,6 @@ from service.presenters.requirements import reference_document, requirements_doc
 from service.presenters.response import response_document
 from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.designs import DesignId
-from schedules.schedule_of import schedule_of
 from service.schemas.controller import InterpolatedGains, Requirements
 from service.schemas.controller import Response as StepResponse
 from service.schemas.wire import PARAMETERS

@@ -7,12 +7,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Request, Response
 
 from schedules.files import FILE_FORMATS, write_schedule
+from schedules.schedule_of import schedule_of
 from service.answering import answer, download_headers
 from service.designs import controller_of
 from service.openapi import problems
 from service.refusals import NotFound
 from service.routes.designs import DesignId
-from schedules.schedule_of import schedule_of
 from service.state import HEAVY, DesignsHere
 
 router = APIRouter(prefix="/v1/designs/{id}/schedules", tags=["schedules"])

@@ -37,6 +37,7 @@ class RootLocus(Answer):
 
     name: str
     loop: str
+    loops: list[str]
     point: int
     sign: Literal[1, -1]
     gains: list[float]

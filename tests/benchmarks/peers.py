@@ -22,6 +22,9 @@ from model.trim import Trim
 from schedules.analysis import PlantEnvelope
 from tests.benchmarks.cases import DURATION, GAINS, SAMPLES, STEP
 
+#: Where `ct.disk_margins` looks [rad/s].
+FREQUENCIES = np.geomspace(0.1, 1e4, 400)
+
 
 def scipy_lqr(plant: TrackingPlant, weights: ExplicitWeights) -> FloatArray:
     """Gain, residual and eigenvalues of each point: what our certificate also holds."""
@@ -83,6 +86,26 @@ def control_margins(loop: Loop) -> FloatArray:
     return np.array(found)
 
 
+def control_all_margins(loop: Loop) -> FloatArray:
+    """Phase margin, distance from -1 and disk margin of both cuts at each point.
+
+    `ct.stability_margins` with all crossovers, and `ct.disk_margins` on 400 frequencies: what our margins hold,
+    but for the peak being a sampled one.
+    """
+    found = []
+    for name in loop.inputs:
+        cut = loop.cut(name)
+        systems = [ct.ss(A, b[:, None], c[None, :], 0) for A, b, c in zip(cut.A, cut.b, cut.c, strict=True)]
+        found.append([_margins_of(system) for system in systems])
+    return np.array(found)
+
+
+def _margins_of(system: Any) -> list[float]:
+    _, pm, sm, *_ = ct.stability_margins(system, returnall=True)
+    disk, *_ = ct.disk_margins(system, FREQUENCIES)
+    return [float(np.min(np.abs(pm))), float(np.min(np.abs(sm), initial=1.0)), float(disk)]
+
+
 def control_steps(loop: Loop) -> FloatArray:
     """Largest magnitude of every output after the step, at each point, by `ct.forced_response`."""
     time = np.linspace(0.0, DURATION, SAMPLES)
@@ -95,29 +118,39 @@ def control_steps(loop: Loop) -> FloatArray:
     return np.array(peaks)
 
 
-def control_whole(plant: PlantEnvelope, weights: ExplicitWeights, loop_of: Any) -> bytes:
-    """The whole request point by point: linear model (analytic, given), LQR, locus, margins, step, peaks, JSON."""
+def control_whole(plant: PlantEnvelope, weights: ExplicitWeights) -> bytes:
+    """The whole request point by point: LQR on the given linear model, locus, margins, step, metrics, peaks, JSON."""
     answer = []
+    gains = np.concatenate([[0.0], np.geomspace(0.01, 100.0, GAINS - 1)])
+    time = np.linspace(0.0, DURATION, SAMPLES)
     for index in np.ndindex(plant.grid.shape):
         model = plant.model.take(index)
-        A5, B5 = np.zeros((5, 5)), np.zeros((5, 2))
-        A5[:4, :4], A5[4, 2], B5[:4] = model.A, -1.0, model.B
-        K, _, poles = ct.lqr(A5, B5, weights.Q, weights.R, method="scipy")
-        loop: Loop = loop_of(model, K)
-        cut = loop.cut("tab")
-        gains = np.concatenate([[0.0], np.geomspace(0.01, 100.0, GAINS - 1)])
-        loci = ct.root_locus_map(ct.ss(cut.A, cut.b[:, None], cut.c[None, :], 0), gains=gains).loci
-        found = [ct.margin(ct.ss(c.A, c.b[:, None], c.c[None, :], 0)) for c in (loop.cut(name) for name in loop.inputs)]
-        system = ct.ss(loop.closed, loop.reference_input, loop.closed_outputs, loop.reference_feedthrough)
-        time = np.linspace(0.0, DURATION, SAMPLES)
+        A, B = np.zeros((5, 5)), np.zeros((5, 2))
+        A[:4, :4], A[4, 2], B[:4] = model.A, -1.0, model.B
+        K, _, poles = ct.lqr(A, B, weights.Q, weights.R, method="scipy")
+        cuts = [ct.ss(A - B[:, [1 - i]] @ K[[1 - i]], B[:, [i]], K[[i]], 0) for i in range(2)]
+        loci = ct.root_locus_map(cuts[0], gains=gains).loci
+        found = [_margins_of(cut) for cut in cuts]
+        system = _step_system(A, B, K)
         outputs = ct.forced_response(system, time, np.full(SAMPLES, STEP)).outputs
-        peaks = np.max(np.abs(outputs + loop.offset[:, None]), axis=1)
+        peaks = np.max(np.abs(outputs), axis=1)
+        metrics = ct.step_info(outputs[0], T=time, yfinal=STEP)
+        bandwidth = ct.bandwidth(system[0, 0])
         answer.append(
             {
                 "K": K.tolist(), "poles": [[p.real, p.imag] for p in poles], "gains": gains.tolist(),
                 "loci": [[[z.real, z.imag] for z in row] for row in loci],
-                "margins": [[float(v) for v in m] for m in found],
+                "margins": found, "metrics": {k: float(v) for k, v in metrics.items()}, "bandwidth": bandwidth,
                 "time": time.tolist(), "outputs": outputs.tolist(), "peaks": peaks.tolist(),
             }
         )  # fmt: skip
     return json.dumps(answer).encode()
+
+
+def _step_system(A: FloatArray, B: FloatArray, K: FloatArray) -> Any:
+    """From r_a to angles, rates and torques, with the feed-forward that rests the aileron without torque."""
+    dt, torque = np.linalg.solve(np.array([[A[1, 0], B[1, 0]], [A[3, 0], B[3, 0]]]), -A[[1, 3], 2])
+    N = K[:, :4] @ np.array([dt, 0.0, 1.0, 0.0]) + np.array([torque, 0.0])
+    E = np.array([0.0, 0.0, 0.0, 0.0, 1.0]) + B @ N
+    C = np.vstack([np.eye(5)[[2, 0, 3, 1]], -K])
+    return ct.ss(A - B @ K, E[:, None], C, np.concatenate([np.zeros(4), N])[:, None])

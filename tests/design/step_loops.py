@@ -87,6 +87,26 @@ def random_stable(seed, count, n=5) -> Loop:
     C = rng.standard_normal((count, 6, n))
     F = 0.05 * rng.standard_normal((count, 6, n))
     D = 0.3 * rng.standard_normal((count, 6, 2))
+    F[:, :4], D[:, :4] = 0.0, 0.0  # angles and rates do not jump
     N = rng.standard_normal((count, 2, 1))
     E = 10.0 * rng.standard_normal((count, n, 1))
     return loop(A + B @ K, B, E, K, N, C, F, D, 0.2 * rng.standard_normal((count, 6)))
+
+
+def servo_and_aileron(servo_bandwidth, servo_damping, omega, zeta) -> Loop:
+    """A first mode of the tab servo and a second of the aileron that it drives: two time scales in one loop.
+
+    ``dt'' + 2 zs ws dt' + ws^2 dt = ws^2 r_a``, ``da'' + 2 z w da' + w^2 da = w^2 dt``; the torques are those
+    of unit inertias, and the loop is flown with gains of zero.
+    """
+    A = np.zeros((4, 4))
+    A[0, 1] = A[2, 3] = 1.0
+    A[1, :2] = [-(servo_bandwidth**2), -2.0 * servo_damping * servo_bandwidth]
+    A[3] = [omega**2, 0.0, -(omega**2), -2.0 * zeta * omega]
+    E = np.array([[0.0], [servo_bandwidth**2], [0.0], [0.0]])
+    C = np.zeros((6, 4))
+    C[:4] = np.eye(4)
+    F = np.zeros((6, 4))
+    F[4, 1] = F[5, 3] = 1.0
+    B, K, N, D = np.zeros((4, 2)), np.zeros((2, 4)), np.zeros((2, 1)), np.zeros((6, 2))
+    return loop(A, B, E, K, N, C, F, D, np.zeros(6))

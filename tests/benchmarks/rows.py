@@ -1,0 +1,158 @@
+"""The comparisons, each of equal work, and the ratio we mean to reach on each."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import orjson
+
+from design.loci import root_locus
+from design.lqr import design_lqr
+from design.margins import margins
+from design.response import step_response
+from design.riccati import solve_riccati
+from model.linearise import linearise
+from schedules.run import run
+from tests.benchmarks import peers
+from tests.benchmarks.cases import DURATION, GAINS, SAMPLES, STEP, Case, case
+from tests.benchmarks.measure import Row
+
+
+def rows() -> list[Row]:
+    """All rows, in the order they are printed."""
+    c = case()
+    return [
+        _linearise_lqr(c),
+        _lqr_scipy(c),
+        _lqr_control(c),
+        _loci(c),
+        _margins(c),
+        _all_margins(c),
+        _steps(c),
+        _whole(c),
+    ]
+
+
+def _close(rtol: float) -> Any:
+    def agree(ours: Any, theirs: Any) -> None:
+        np.testing.assert_allclose(ours, theirs, rtol=rtol, atol=rtol * np.max(np.abs(theirs)))
+
+    return agree
+
+
+def _linearise_lqr(c: Case) -> Row:
+    controller = c.study.controllers[0]
+
+    def ours() -> Any:
+        model = linearise(c.plant.system, c.plant.grid.condition, c.plant.trim)
+        return design_lqr(model, controller).K.reshape(25, 2, 5)
+
+    return Row(
+        "linearise + LQR with certificate", "ct.linearize + ct.lqr", 40.0, ours,
+        lambda: peers.control_linearise_lqr(c.plant, c.weights), _close(1e-4),
+    )  # fmt: skip
+
+
+def _solve(c: Case) -> Any:
+    return solve_riccati(c.tracking.A, c.tracking.B, c.weights.Q, c.weights.R).K
+
+
+def _lqr_scipy(c: Case) -> Row:
+    return Row(
+        "LQR, 5 states", "scipy loop", 12.0, lambda: _solve(c), lambda: peers.scipy_lqr(c.tracking, c.weights),
+        _close(1e-8),
+    )  # fmt: skip
+
+
+def _lqr_control(c: Case) -> Row:
+    return Row(
+        "LQR, 5 states", "ct.lqr loop (scipy method)", 12.0, lambda: _solve(c),
+        lambda: peers.control_lqr(c.tracking, c.weights), _close(1e-8),
+    )  # fmt: skip
+
+
+def _loci(c: Case) -> Row:
+    cut = c.loop.cut("tab")
+    gains = root_locus(cut, count=GAINS).gains
+
+    def agree(ours: Any, theirs: Any) -> None:
+        for branches, loci in zip(ours, theirs, strict=True):
+            for a, b in zip(branches.T[::20], loci[::20], strict=True):
+                np.testing.assert_allclose(np.sort_complex(a), np.sort_complex(b), rtol=1e-6, atol=1e-6)
+
+    return Row(
+        f"root loci with tracking, {gains.shape[-1]} gains", "ct.root_locus_map loop", 24.0,
+        lambda: root_locus(cut, gains).branches, lambda: peers.control_loci(c.loop, gains), agree,
+    )  # fmt: skip
+
+
+def _margins(c: Case) -> Row:
+    def ours() -> Any:
+        return np.rad2deg(margins(c.loop.cuts()).phase_margin)
+
+    return Row(
+        "all margins against gain and phase only", "ct.margin loop", 20.0, ours, lambda: peers.control_margins(c.loop),
+        _close(1e-6),
+    )  # fmt: skip
+
+
+def _all_margins(c: Case) -> Row:
+    def ours() -> Any:
+        found = margins(c.loop.cuts())
+        return np.stack([np.rad2deg(found.phase_margin), 1.0 / found.sensitivity_peak, found.disk_margin], axis=-1)
+
+    return Row(
+        "all margins, disk margin and peak of S", "ct.stability_ + disk_margins", 20.0, ours,
+        lambda: peers.control_all_margins(c.loop), _close(2e-3),
+    )  # fmt: skip
+
+
+def _steps(c: Case) -> Row:
+    def ours() -> Any:
+        response = step_response(c.loop, np.array([STEP]), DURATION, SAMPLES)
+        return response, response.peaks
+
+    def agree(ours: Any, theirs: Any) -> None:
+        response, peaks = ours
+        np.testing.assert_allclose(np.max(np.abs(response.outputs), axis=-2), theirs, rtol=1e-9, atol=1e-9)
+        assert np.all(peaks >= theirs * (1 - 1e-12))  # refined between the samples, which the peer's are not
+
+    return Row(
+        "step, 501 samples, 6 outputs, peaks", "ct.forced_response loop", 60.0, ours,
+        lambda: peers.control_steps(c.loop), agree,
+    )  # fmt: skip
+
+
+def _whole(c: Case) -> Row:
+    def ours() -> bytes:
+        envelope = run(c.study)
+        lqr = envelope.controllers[0]
+        locus = root_locus(lqr.loop.cut("tab"), count=GAINS)
+        response = step_response(lqr.loop, np.array([STEP]), DURATION, SAMPLES)
+        assert lqr.assessment is not None
+        answer = {
+            "gains": {g.name: np.ascontiguousarray(g.values) for g in lqr.gains},
+            "poles": [np.ascontiguousarray(lqr.assessment.poles.real), np.ascontiguousarray(lqr.assessment.poles.imag)],
+            "locus_gains": locus.gains,
+            "branches": [np.ascontiguousarray(locus.branches.real), np.ascontiguousarray(locus.branches.imag)],
+            "margins": [[m.gain_margin_up_db, m.gain_margin_down_db, m.phase_margin] for m in lqr.assessment.margins],
+            "time": np.ascontiguousarray(response.time), "outputs": np.ascontiguousarray(response.outputs),
+            "peaks": [[d.peak_torque, d.peak_rate, d.peak_power] for d in lqr.assessment.demand],
+        }  # fmt: skip
+        return orjson.dumps(answer, option=orjson.OPT_SERIALIZE_NUMPY)
+
+    def agree(ours: bytes, theirs: bytes) -> None:
+        mine, other = orjson.loads(ours), json.loads(theirs)
+        K = np.array([point["K"] for point in other])
+        for i, u in enumerate(("T_t", "T_a")):
+            for j, x in enumerate(("dt", "dt_rate", "da", "da_rate", "int_a")):
+                np.testing.assert_allclose(np.ravel(mine["gains"][f"K_{u}_{x}"]), K[:, i, j], rtol=1e-6, atol=1e-9)
+        da = np.array([point["outputs"][0] for point in other])
+        np.testing.assert_allclose(np.reshape(mine["outputs"], (25, SAMPLES, -1))[..., 0], da, rtol=1e-6, atol=1e-9)
+
+    return Row(
+        "whole request: run + locus + step + JSON", "python-control loop", 40.0, ours,
+        lambda: peers.control_whole(c.plant, c.weights), agree,
+    )  # fmt: skip

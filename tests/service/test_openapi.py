@@ -1,0 +1,175 @@
+"""The OpenAPI document: every request example runs, every answer is as declared, every error is declared."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import quote
+
+import pytest
+from fastapi.testclient import TestClient
+from pydantic import TypeAdapter
+
+from service.errors import STATUS
+from service.schemas.problem import Problem
+
+METHODS = ("get", "post")
+
+
+@pytest.fixture(scope="module")
+def document(client: TestClient) -> dict[str, Any]:
+    openapi: dict[str, Any] = client.get("/openapi.json").json()
+    return openapi
+
+
+def operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            yield path, method, operation
+
+
+def example_of(parameter: dict[str, Any]) -> Any:
+    """The example of a parameter; None when an optional one has none."""
+    if "example" in parameter:
+        return parameter["example"]
+    examples = parameter.get("examples") or parameter["schema"].get("examples")
+    assert examples or not parameter["required"], f"{parameter['name']} is required and has no example"
+    return examples[0] if examples else None
+
+
+def address(path: str, operation: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Path and query of the operation with the examples of its parameters."""
+    query = {}
+    for parameter in operation.get("parameters", []):
+        value = example_of(parameter)
+        if parameter["in"] == "path":
+            path = path.replace(f"{{{parameter['name']}}}", quote(str(value)))
+        elif value is not None:
+            query[parameter["name"]] = value
+    return path, query
+
+
+def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
+    assert {(method, path) for path, method, _ in operations(document)} == {
+        ("post", "/v1/designs"),
+        ("get", "/v1/designs"),
+        ("get", "/v1/designs/{id}"),
+        ("get", "/v1/designs/{id}/points/{index}"),
+        ("get", "/v1/designs/{id}/controllers/{name}/root-locus"),
+        ("get", "/v1/designs/{id}/controllers/{name}/response"),
+        ("get", "/v1/designs/{id}/controllers/{name}/actuator-requirements"),
+        ("get", "/v1/designs/{id}/controllers/{name}/gains"),
+        ("get", "/v1/designs/{id}/schedules/{controller}.{suffix}"),
+        ("get", "/v1/atmosphere"),
+        ("post", "/v1/hinge-moments"),
+        ("post", "/v1/linear-models"),
+        ("get", "/v1/examples"),
+        ("get", "/v1/examples/{name}"),
+        ("get", "/v1/limits"),
+        ("get", "/v1/version"),
+        ("get", "/healthz"),
+    }
+
+
+def test_every_body_example_runs(client: TestClient, document: dict[str, Any]) -> None:
+    ran = []
+    for path, method, operation in operations(document):
+        examples = operation.get("requestBody", {}).get("content", {}).get("application/json", {}).get("examples", {})
+        assert bool(examples) == (method == "post"), path
+        for name, example in examples.items():
+            response = client.post(path, json=example["value"])
+            assert response.status_code in (200, 201), (path, name, response.text)
+            assert str(response.status_code) in operation["responses"]
+            ran.append((path, name))
+    assert len(ran) == 5
+
+
+@pytest.mark.usefixtures("design")
+def test_every_parameter_example_runs(client: TestClient, document: dict[str, Any]) -> None:
+    """With the example design posted, every GET of the document works as its examples say, names and all."""
+    for path, method, operation in operations(document):
+        if method == "get":
+            where, query = address(path, operation)
+            response = client.get(where, params=query)
+            assert response.status_code == 200, (where, query, response.text)
+            media = response.headers["content-type"].partition(";")[0]
+            assert media in operation["responses"]["200"]["content"], (path, media)
+
+
+@pytest.mark.usefixtures("design")
+def test_answers_are_what_their_models_say(client: TestClient, document: dict[str, Any]) -> None:
+    """Every JSON answer has exactly the fields of its declared model."""
+    models = {route.path: route.response_model for route in _routes(client)}
+    checked = 0
+    for path, method, operation in operations(document):
+        where, query = address(path, operation)
+        if method == "post":
+            (example, *_) = operation["requestBody"]["content"]["application/json"]["examples"].values()
+            response = client.post(where, json=example["value"])
+        else:
+            response = client.get(where, params=query)
+        model = models[path]
+        if model is not None:
+            TypeAdapter(model).validate_python(response.json(), strict=True)
+            checked += 1
+    assert checked == 16
+
+
+def _routes(client: TestClient) -> list[Any]:
+    from service.routes import ROUTERS
+
+    return [route for router in ROUTERS for route in router.routes if hasattr(route, "response_model")]
+
+
+def test_every_error_is_declared_with_its_shape(document: dict[str, Any]) -> None:
+    known = {str(status) for status, _, _ in STATUS.values()}
+    for path, method, operation in operations(document):
+        responses = operation["responses"]
+        errors = {status: r for status, r in responses.items() if status[0] in "45"}
+        assert set(errors) <= known, path
+        for response in errors.values():
+            (media, content), *others = response["content"].items()
+            assert (media, others) == ("application/problem+json", [])
+            assert content["schema"] == {"$ref": "#/components/schemas/Problem"}
+            Problem.model_validate(content["example"], strict=True)
+        if method == "post":
+            assert {"400", "413", "415", "422"} <= set(errors), path
+        if "{id}" in path:
+            assert {"404", "503"} <= set(errors), path
+        if any(p["in"] == "query" for p in operation.get("parameters", [])):
+            assert "422" in errors, path
+    assert "HTTPValidationError" not in document["components"]["schemas"]
+    assert {"Problem", "FieldProblem"} <= set(document["components"]["schemas"])
+
+
+def test_references_lead_somewhere(document: dict[str, Any]) -> None:
+    text = json.dumps(document)
+    names = {part.split('"')[0] for part in text.split('"#/components/schemas/')[1:]}
+    assert names <= set(document["components"]["schemas"])
+
+
+def test_every_operation_is_described(document: dict[str, Any]) -> None:
+    for path, _, operation in operations(document):
+        assert operation.get("description"), path
+        assert operation.get("tags"), path
+        assert operation["responses"].get("304") or operation.get("requestBody"), path
+
+
+def test_numbers_state_their_unit(document: dict[str, Any]) -> None:
+    """Every numeric field of the document says its unit; that of a dimensional name is the one it ends in."""
+    schemas = document["components"]["schemas"]
+    chord = schemas["Geometry"]["properties"]["chord_m"]
+    assert (chord["unit"], chord["minimum"], chord["maximum"]) == ("m", 0.001, 100.0)
+    assert schemas["Demand"]["properties"]["peak_rate_deg_s"]["unit"] == "deg/s"
+    assert schemas["BrysonWeights"]["properties"]["aileron_integral_deg_s"]["unit"] == "deg s"
+    for name, schema in schemas.items():
+        for field, node in schema.get("properties", {}).items():
+            if '"type": "number"' in json.dumps(node):
+                assert node.get("unit"), (name, field)
+
+
+def test_the_document_names_no_outside_server(document: dict[str, Any]) -> None:
+    assert "servers" not in document
+    assert "http://" not in json.dumps(document)
+    assert "https://" not in json.dumps(document)
