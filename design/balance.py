@@ -30,9 +30,20 @@ def balance_exponents(A: FloatArray, F: FloatArray, Q: FloatArray) -> IntArray:
     -------
     (N, n + 1) integers: tau, then the binary exponent of the largest entry of the balanced H
     """
-    h = _log2_hamiltonian(A, F, Q)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        h = _log2_hamiltonian(A, F, Q)
+        d, columns = _levelled(h)
+        poles = np.log2(np.abs(np.diagonal(A, axis1=1, axis2=2)).max(axis=1))
+    size = np.maximum(columns.max(axis=0), poles)
+    size[~np.isfinite(size)] = 0.0
     n = A.shape[-1]
-    d = np.zeros((2 * n, len(A)))
+    return np.asarray(np.rint(np.concatenate([d[:n], size[None]])).T, dtype=np.int64)
+
+
+def _levelled(h: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Exponents (2n, N) of states and costates, and log2 of the largest entry of each column under them."""
+    n = len(h) // 2
+    d = np.zeros((2 * n, h.shape[-1]))
     columns = np.max(h, axis=0)
     # The row of state i has the entries of the column of its costate n + i; zero ones cannot be balanced.
     scalable = np.isfinite(columns[n:] - columns[:n])
@@ -46,11 +57,7 @@ def balance_exponents(A: FloatArray, F: FloatArray, Q: FloatArray) -> IntArray:
         d[:n] += step
         d[n:] -= step
         columns = np.max(h - d[:, None], axis=0) + d
-    with np.errstate(divide="ignore"):
-        poles = np.log2(np.abs(np.diagonal(A, axis1=1, axis2=2)).max(axis=1))
-    size = np.maximum(columns.max(axis=0), poles)
-    size[~np.isfinite(size)] = 0.0
-    return np.asarray(np.rint(np.concatenate([d[:n], size[None]])).T, dtype=np.int64)
+    return d, columns
 
 
 def _log2_hamiltonian(A: FloatArray, F: FloatArray, Q: FloatArray) -> FloatArray:
@@ -69,7 +76,6 @@ def _log2_hamiltonian(A: FloatArray, F: FloatArray, Q: FloatArray) -> FloatArray
     diagonal = np.arange(2 * n)
     H[:, diagonal, diagonal] = 0.0
     h = np.abs(H.transpose(1, 2, 0), order="C")
-    with np.errstate(divide="ignore"):
-        np.log2(h, out=h)
+    np.log2(h, out=h)
     h[:n, n:] += 2 * size[:, 0, 0]
     return h

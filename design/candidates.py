@@ -19,7 +19,9 @@ from model.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 #: A candidate that misses a spec by more than this part of it is not judged any further.
 NEAR = 0.5
 FREQUENCIES = 140
-TIMES = 320
+TIMES = 160
+#: A step is followed until its slowest mode has gone through this many time constants, or to the horizon.
+DECAYED = 10.0
 #: Oscillatory modes whose damping is followed, least damped first.
 MODES = 3
 #: How many candidates are expanded over frequency or time at once; bounds the memory.
@@ -46,6 +48,16 @@ class Judged:
         scale = abs(spec.limit) if spec.limit else 1.0
         miss = -spec.distance(self.values[spec.quantity]) / scale
         return np.where(np.isnan(miss), np.inf, miss)
+
+    def take(self, index: IntArray | BoolArray) -> Judged:
+        """These figures at some candidates."""
+        return Judged({name: v[index] for name, v in self.values.items()}, self.bandwidth[index])
+
+    def put(self, index: IntArray, other: Judged) -> None:
+        """Overwrite the figures of some candidates."""
+        for name, v in self.values.items():
+            v[index] = other.values[name]
+        self.bandwidth[index] = other.bandwidth
 
     def where(self, keep: BoolArray, other: Judged) -> Judged:
         """These figures where `keep`, those of `other` elsewhere."""
@@ -202,11 +214,10 @@ class CandidateJudge:
         slope = np.einsum("kn,krn->kr", polynomial[:, :-1] * np.arange(n - 1, 0, -1), powers[..., 1:])
         slope *= roots
         residues = np.einsum("kn,krn->kr", numerator, powers) / np.where(slope == 0, np.inf, slope)
-        dt = self.horizon[at] / TIMES
-        ratio = np.exp(roots * dt[:, None])
-        e = residues[..., None] * np.cumprod(np.broadcast_to(ratio[..., None], (*ratio.shape, TIMES)), axis=-1)
-        error = np.concatenate([np.full((at.size, 1), -1.0), e.sum(axis=1).real], axis=-1)  # y - 1
-        return _peak(error), _settling(error) * dt / self.form.frequency[at]
+        slowest = np.min(-roots.real, axis=-1)
+        length = np.minimum(self.horizon[at], DECAYED / slowest)
+        error = _Error(roots, residues, length / TIMES)
+        return error.peak(), error.settling() / self.form.frequency[at]
 
 
 def _near(judged: Judged, rows: IntArray, specs: tuple[Spec, ...], quantities: tuple[str, ...]) -> BoolArray:
@@ -226,23 +237,43 @@ def _roots(polynomial: FloatArray) -> ComplexArray:
     return np.asarray(np.linalg.eigvals(companion), dtype=complex)
 
 
-def _peak(error: FloatArray) -> FloatArray:
-    """Largest value above the final one, by a parabola through the largest sample; at least 0."""
-    k = np.clip(np.argmax(error, axis=-1), 1, error.shape[-1] - 2)
-    row = np.arange(k.size)
-    left, mid, right = error[row, k - 1], error[row, k], error[row, k + 1]
-    bend = left - 2.0 * mid + right
-    lift = np.where(bend < 0, -((right - left) ** 2) / (8.0 * np.where(bend < 0, bend, -1.0)), 0.0)
-    return np.asarray(np.maximum(mid + lift, 0.0))
+class _Error:
+    """``y - 1`` of K unit steps, a sum of modes: sampled, and exact wherever an event is refined."""
 
+    def __init__(self, roots: ComplexArray, residues: ComplexArray, dt: FloatArray) -> None:
+        self.roots, self.residues, self.dt = roots, residues, dt
+        ratio = np.exp(roots * dt[:, None])
+        modes = np.cumprod(np.broadcast_to(ratio[..., None], (*ratio.shape, TIMES)), axis=-1)
+        later = np.einsum("kr,krt->kt", residues, modes).real
+        self.samples = np.concatenate([np.full((dt.size, 1), -1.0), later], axis=-1)
 
-def _settling(error: FloatArray, band: float = 0.02) -> FloatArray:
-    """Time, in samples, after which the error stays within the band; nan when it does not within the horizon."""
-    outside = np.abs(error) > band
-    last = error.shape[-1] - 1 - np.argmax(outside[:, ::-1], axis=-1)
-    settled = last < error.shape[-1] - 1
-    k = np.minimum(last, error.shape[-1] - 2)
-    row = np.arange(k.size)
-    a, b = np.abs(error[row, k]), np.abs(error[row, k + 1])
-    time = k + (a - band) / np.where(a > b, a - b, 1.0)
-    return np.where(settled & outside.any(axis=-1), time, np.where(settled, 0.0, np.nan))
+    def at(self, t: FloatArray) -> ComplexArray:
+        """(K, n) modes at time t (K,)."""
+        return np.asarray(self.residues * np.exp(self.roots * t[:, None]))
+
+    def peak(self) -> FloatArray:
+        """Largest value (K,) above the final one: Newton on the slope from the largest sample; at least 0."""
+        k = np.argmax(self.samples, axis=-1)
+        t = k * self.dt
+        for _ in range(3):
+            modes = self.at(t)
+            slope, bend = (np.sum(modes * self.roots**p, axis=-1).real for p in (1, 2))
+            step = np.where(bend < 0, -slope / np.where(bend < 0, bend, -1.0), 0.0)
+            t = np.clip(t + np.clip(step, -self.dt, self.dt), 0.0, None)
+        refined = np.sum(self.at(t), axis=-1).real
+        return np.asarray(np.maximum(np.maximum(self.samples[np.arange(k.size), k], refined), 0.0))
+
+    def settling(self, band: float = 0.02) -> FloatArray:
+        """Time (K,) after which the error stays within the band; nan when it does not within the samples."""
+        outside = np.abs(self.samples) > band
+        last = self.samples.shape[-1] - 1 - np.argmax(outside[:, ::-1], axis=-1)
+        settled = last < self.samples.shape[-1] - 1
+        k = np.minimum(last, self.samples.shape[-1] - 2)
+        low, high = k * self.dt, (k + 1) * self.dt
+        f_low, f_high = (np.abs(self.samples[np.arange(k.size), i]) - band for i in (k, k + 1))
+        for _ in range(3):
+            t = low + f_low * (high - low) / np.where(f_low > f_high, f_low - f_high, np.inf)
+            f = np.abs(np.sum(self.at(t), axis=-1).real) - band
+            low, f_low = np.where(f > 0, t, low), np.where(f > 0, f, f_low)
+            high, f_high = np.where(f > 0, high, t), np.where(f > 0, f_high, f)
+        return np.where(settled, t, np.nan)

@@ -14,8 +14,8 @@ from typing import TypeVar
 import numpy as np
 
 from design.loop import SisoLoop
-from design.polynomials import power_of_two_scale
-from design.transfer import Transfer, response, transfer
+from design.polynomials import nearby_power_of_two
+from design.transfer import Transfer, markov_parameters, response, transfer_of_poles
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
 
 AnyArray = TypeVar("AnyArray", FloatArray, ComplexArray)
@@ -61,18 +61,19 @@ def closed_loop(loop: SisoLoop) -> ClosedLoop:
     n = loop.A.shape[-1]
     A, c = loop.A.reshape(-1, n, n), loop.c.reshape(-1, n)
     b = loop.b.reshape(-1, n) * (loop.sign * loop.gain.reshape(-1))[:, None]
-    open_loop = transfer(A, b, c)
-    scale = power_of_two_scale(open_loop.denominator + open_loop.numerator)
-    scaled = open_loop.scaled(scale)
-    b = b / scale[:, None]
-    closed = A / scale[:, None, None] - b[:, :, None] * c[:, None, :]
-    poles = np.linalg.eigvals(closed).astype(complex)
+    closed = A - b[:, :, None] * c[:, None, :]
+    poles, open_poles = (np.linalg.eigvals(m).astype(complex) for m in (closed, A))
+    scale = nearby_power_of_two(np.maximum(np.abs(poles), np.abs(open_poles)).max(axis=-1))
+    open_loop = transfer_of_poles(open_poles, poles, np.ones_like(scale), markov_parameters(A, b, c))
+    ratio = open_loop.scaled(scale)
+    closed, b = closed / scale[:, None, None], b / scale[:, None]
+    poles = (poles / scale[:, None]).astype(complex)
     regular = np.abs(poles.real).min(axis=-1) > 1e-12 * np.abs(poles).max(axis=-1)
     if not regular.all():
         closed, b, poles = (_replaced(v, regular, w) for v, w in ((closed, -np.eye(n)), (b, 0.0), (poles, -1.0)))
-        no_loop = (scaled.numerator, 0.0), (scaled.denominator, np.poly(-np.ones(n)).astype(float))
-        scaled = Transfer(*(_replaced(v, regular, w) for v, w in no_loop))
-    return ClosedLoop(closed, b, c, scaled, poles, scale, loop.delay * scale, regular)
+        no_loop = (ratio.numerator, 0.0), (ratio.denominator, np.poly(-np.ones(n)).astype(float))
+        ratio = Transfer(*(_replaced(v, regular, w) for v, w in no_loop))
+    return ClosedLoop(closed, b, c, ratio, poles, scale, loop.delay * scale, regular)
 
 
 def _replaced(values: AnyArray, kept: BoolArray, others: FloatArray | float) -> AnyArray:

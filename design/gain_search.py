@@ -25,7 +25,11 @@ STEERABLE = ("damping_ratio", "gain_margin", "phase_margin", "settling_time", "o
 #: Part of each limit kept in hand, because the search's figures are interpolated ones.
 IN_HAND = 1e-3
 STARTS = 3
-ITERATIONS = 30
+ITERATIONS = 40
+#: A search whose trust region has shrunk to this, in its coordinates, has arrived.
+SMALLEST_RADIUS = 3e-5
+#: Points searched together; bounds the memory.
+BLOCK = 128
 #: What missing a spec by its whole limit costs, in the logarithm of the bandwidth.
 PRICE = 20.0
 #: Ranks above every candidate that misses a spec.
@@ -100,6 +104,18 @@ def search_gains(form: NormalForm, specs: tuple[Spec, ...], horizon: float) -> F
     for spec in specs:
         if spec.quantity not in STEERABLE:
             raise ValueError(f"{spec.quantity} cannot steer a synthesis; it can be one of {', '.join(STEERABLE)}")
+    points = form.frequency.size
+    blocks = [
+        _search_block(form.take(slice(start, start + BLOCK)), specs, horizon) for start in range(0, points, BLOCK)
+    ]
+    return Found(
+        np.concatenate([b.coordinates for b in blocks]),
+        np.concatenate([b.feasible for b in blocks]),
+        tuple(reason for b in blocks for reason in b.infeasibility),
+    )
+
+
+def _search_block(form: NormalForm, specs: tuple[Spec, ...], horizon: float) -> Found:
     with np.errstate(over="ignore", divide="ignore", invalid="ignore", under="ignore"):
         best = _Search(form, horizon, specs, None).run()
         feasible = best.merit >= _MET
@@ -166,27 +182,33 @@ class _Search:
         at = np.repeat(np.arange(self.points), STARTS)
         radius = np.tile(spacing, (u.shape[0], 1))
         judged = self._judge(at, u)
-        best_u, best = u, self._strict(judged)
-        worth = self._priced(judged)
+        best_u, best = u.copy(), self._strict(judged)
+        going = np.arange(u.shape[0])
         for _ in range(ITERATIONS):
-            low, high = np.maximum(u - radius, 0.0), np.minimum(u + radius, 1.0)
-            slope, gradient = self._slopes(at, u, judged)
-            tried = u + best_vertex(slope, self._constraints(at, u, judged), gradient, low - u, high - u)
-            new = self._judge(at, tried)
-            # The walls are curved: step once more from where that led, with the same slopes.
-            again = tried + best_vertex(slope, self._constraints(at, tried, new), gradient, low - tried, high - tried)
-            corrected = self._judge(at, again)
-            straight = self._priced(new) >= self._priced(corrected)
-            tried, new = np.where(straight[:, None], tried, again), new.where(straight, corrected)
-            gained = self._priced(new)
-            better = gained > worth
-            radius = radius * np.where(better, 1.5, 0.35)[:, None]
-            u, worth = np.where(better[:, None], tried, u), np.where(better, gained, worth)
-            judged = judged.where(~better, new)
+            here = judged.take(going)
+            tried, new = self._advance(at[going], u[going], here, radius[going])
+            better = self._priced(new) > self._priced(here)
+            radius[going] *= np.where(better, 1.5, 0.35)[:, None]
             strict = self._strict(new)
-            best_u = np.where((strict > best)[:, None], tried, best_u)
-            best = np.maximum(best, strict)
+            record = strict > best[going]
+            best_u[going[record]], best[going[record]] = tried[record], strict[record]
+            u[going[better]] = tried[better]
+            judged.put(going[better], new.take(better))
+            going = going[np.max(radius[going], axis=-1) > SMALLEST_RADIUS]
+            if going.size == 0:
+                break
         return self._winner(best_u, best)
+
+    def _advance(self, at: IntArray, u: FloatArray, judged: Judged, radius: FloatArray) -> tuple[FloatArray, Judged]:
+        """Best vertex of the linearised problem, and once more from where that led: the walls are curved."""
+        low, high = np.maximum(u - radius, 0.0), np.minimum(u + radius, 1.0)
+        slope, gradient = self._slopes(at, u, judged)
+        tried = u + best_vertex(slope, self._constraints(at, u, judged), gradient, low - u, high - u)
+        new = self._judge(at, tried)
+        again = tried + best_vertex(slope, self._constraints(at, tried, new), gradient, low - tried, high - tried)
+        corrected = self._judge(at, again)
+        straight = self._priced(new) >= self._priced(corrected)
+        return np.where(straight[:, None], tried, again), new.where(straight, corrected)
 
     def _winner(self, u: FloatArray, merit: FloatArray) -> _Best:
         merit = merit.reshape(self.points, STARTS)

@@ -8,14 +8,26 @@ from typing import Self
 import numpy as np
 
 from design.crossovers import real_axis_frequencies
-from design.polynomials import evaluate, leading_zeros, magnitude_bound, product, roots, with_derivatives
-from design.transfer import Transfer, response, transfer
-from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
+from design.polynomials import (
+    evaluate,
+    leading_zeros,
+    magnitude_bound,
+    nearby_power_of_two,
+    product,
+    roots,
+    with_derivatives,
+)
+from design.transfer import Transfer, markov_parameters, natural_gain, response, transfer_of_poles
+from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays
 
 #: A polynomial counts as zero below this part of the terms it is the sum of. At a simple pole on the axis the
 #: root of a polynomial is good to nearly all digits; where two poles meet, to half of them, and poles that
 #: crowd together make small values of their own.
 VANISHING_ON_AXIS, VANISHING = 1e-9, 1e-13
+#: Poles below this part of the largest are at the origin; the origin is looked at this far below the others.
+AT_ORIGIN, LOW = 1e-7, 1e-5
+#: A gain beyond this many times the reference is that of a loop that rounding alone has closed.
+LARGEST = 1e12
 #: A crossing is this near to the root of the polynomial that it starts from, in parts of its frequency; the
 #: last of the Newton steps to a breakaway is not longer than this, and all of them together than `NEARBY`.
 SETTLED, NEARBY = 1e-5, 1e-2
@@ -31,22 +43,44 @@ NEARLY_REAL = 1e-6
 class Landmarks(GridArrays):
     """The loop ``L = c (sI - A)^-1 b`` of a locus ``1 + k L = 0``, k > 0, in units of `scale` [rad/s].
 
-    Common factors s of numerator and denominator are cancelled in `transfer` (an integral that the loop does
-    not feed back): they are poles that do not move, and would hide a crossing at the origin.
+    Attributes
+    ----------
+    A, b, c : (N, n, n), (N, n), (N, n)
+    transfer : L as polynomials, (N, n+1)
+    markov : (N, n+1) its expansion at infinity
+    reference : (N,) a gain that moves the poles fairly
+    origin : (N,) a frequency far below those of all poles that are not at the origin
+    scale : (N,) [rad/s]
     """
 
     A: FloatArray
     b: FloatArray
     c: FloatArray
     transfer: Transfer
+    markov: FloatArray
+    reference: FloatArray
+    origin: FloatArray
     scale: FloatArray
 
     @classmethod
-    def of(cls, A: FloatArray, b: FloatArray, c: FloatArray) -> Self:
-        """From the state matrices (N, n, n), (N, n), (N, n) of N points in rad/s; b carries the sign."""
-        full = transfer(A, b, c)
-        scale = full.frequency_scale
-        return cls(A / scale[:, None, None], b / scale[:, None], c, full.scaled(scale).without_common_origin(), scale)
+    def of(cls, A: FloatArray, b: FloatArray, c: FloatArray, gain: FloatArray) -> Self:
+        """From the state matrices (N, n, n), (N, n), (N, n) of N points in rad/s; b carries the sign.
+
+        The reference is `gain` (N,), or where that is 0 the natural one.
+        """
+        poles = np.linalg.eigvals(A).astype(complex)
+        if np.any(gain == 0.0):
+            gain = np.where(gain == 0.0, natural_gain(A, b, c, poles), gain)
+        moved = np.linalg.eigvals(A - gain[:, None, None] * b[:, :, None] * c[:, None, :]).astype(complex)
+        size = np.abs(np.concatenate([poles, moved], axis=-1))
+        scale = nearby_power_of_two(size.max(axis=-1))
+        slowest = np.where(size > AT_ORIGIN * scale[:, None], size, np.inf).min(axis=-1)
+        A, b = A / scale[:, None, None], b / scale[:, None]
+        markov = markov_parameters(A, b, c)
+        poles, moved = (np.asarray(v / scale[:, None], dtype=complex) for v in (poles, moved))
+        ratio = transfer_of_poles(poles, moved, gain, markov)
+        origin = LOW * np.where(np.isfinite(slowest), slowest / scale, 1.0)
+        return cls(A, b, c, ratio, markov, gain, origin, scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,22 +97,34 @@ def crossings(landmarks: Landmarks) -> Marks:
     omega = real_axis_frequencies(ratio.numerator, ratio.denominator)
     s = np.asarray(1j * omega, dtype=complex)
     marked = _significant(ratio, s, VANISHING_ON_AXIS)
-    gain = np.full(s.shape, np.nan)
-    denominator, numerator = ratio.denominator[:, -1], ratio.numerator[:, -1]
-    gain[:, 0] = np.where(marked[:, 0], -denominator / np.where(marked[:, 0], numerator, 1.0), np.nan)
-    # The origin has been dealt with by the polynomials, where a pole that does not move is cancelled.
     marked[:, 0] = False
+    gain = np.full(s.shape, np.nan)
+    gain[:, 0] = _gain_at_origin(landmarks)
     rows = np.nonzero(marked)[0]
     w = omega[marked]
     at = response(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], s[marked][:, None])
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.where(at.value.imag == 0.0, 0.0, at.value.imag / at.slope.real)[:, 0]
     close = np.abs(step) <= SETTLED * w
-    w = np.where(close, w - step, w)
-    at = response(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], np.asarray(1j * w, dtype=complex)[:, None])
-    s[marked] = 1j * w
+    s[marked] = 1j * np.where(close, w - step, w)
+    at = response(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], s[marked][:, None])
     gain[marked] = np.where(close, (-1.0 / at.value[:, 0]).real, np.nan)
     return _sorted(gain, np.asarray(s * landmarks.scale[:, None], dtype=complex))
+
+
+def _gain_at_origin(landmarks: Landmarks) -> FloatArray:
+    """Gain (N,) that puts a moving pole at the origin; nan where L has no limit there.
+
+    L is looked at just beside the origin, where a pole at the origin that does not move (an integral that the
+    loop does not feed back) does no harm, and extrapolated. It has a limit if it is the same twice as far out.
+    """
+    s = np.asarray(1j * landmarks.origin[:, None] * np.array([1.0, 2.0]), dtype=complex)
+    L = response(landmarks.A, landmarks.b, landmarks.c, s).value
+    near, far = L[:, 0], L[:, 1]
+    limit = (np.abs(far - near) < 1e-3 * np.abs(near)) & np.any(landmarks.markov != 0.0, axis=-1)
+    inverse = -1.0 / np.where(limit[:, None], L, 1.0).real
+    gain = (4.0 * inverse[:, 0] - inverse[:, 1]) / 3.0
+    return np.where(limit & (np.abs(gain) < LARGEST * landmarks.reference), gain, np.nan)
 
 
 def breakaways(landmarks: Landmarks) -> Marks:
@@ -111,35 +157,21 @@ def breakaways(landmarks: Landmarks) -> Marks:
 def asymptotes(landmarks: Landmarks) -> tuple[FloatArray, FloatArray]:
     """Centroid (N,) [rad/s] and angles (N, n) [rad] of the branches that go to infinity.
 
-    With p more poles than zeros, ``L -> h / (s - centroid)^p``: angles ``(2 l + 1) pi / p`` for ``h > 0`` and
-    ``2 l pi / p`` for ``h < 0``; the centroid is (sum of poles - sum of zeros) / p.
+    With p more poles than zeros, ``L = h / s^p + h' / s^(p+1) .. -> h / (s - centroid)^p``: the angles are
+    ``(2 l + 1) pi / p`` for ``h > 0`` and ``2 l pi / p`` for ``h < 0``; the centroid ``h' / (p h)`` is (sum of
+    poles - sum of zeros) / p.
     """
-    ratio, n = landmarks.transfer, landmarks.A.shape[-1]
-    pole, zero = leading_zeros(ratio.denominator), leading_zeros(ratio.numerator)
-    excess = (zero - pole)[:, None]
-    exists = zero <= n
-    h, of_zeros = _coefficients(ratio.numerator, zero)
-    _, of_poles = _coefficients(ratio.denominator, pole)
-    centroid = (of_zeros / np.where(exists, h, 1.0) - of_poles) / excess[:, 0]
+    markov = landmarks.markov
+    n = markov.shape[-1] - 1
+    chain = leading_zeros(markov)
+    exists = chain < n
+    excess = np.where(exists, chain + 1, 1)
+    h, following = (np.take_along_axis(markov, np.minimum(chain + i, n)[:, None], axis=-1)[:, 0] for i in (0, 1))
+    centroid = landmarks.scale * following / (np.where(exists, h, 1.0) * excess)
     turn = 2 * np.arange(n) + (h > 0.0)[:, None]
-    angle = np.pi * np.where(turn > excess, turn - 2 * excess, turn) / excess
-    angle = np.where(exists[:, None] & (np.arange(n) < excess), angle, np.nan)
-    return np.where(exists, centroid * landmarks.scale, np.nan), np.sort(angle, axis=-1)
-
-
-def natural_gain(landmarks: Landmarks) -> FloatArray:
-    """Gain (N,) at which ``|k L| = 1`` at the frequency of the fastest poles; 1 where there is none."""
-    j = np.full((len(landmarks.scale), 1), 1j)
-    top, bottom = (np.abs(evaluate(p, j))[:, 0] for p in (landmarks.transfer.denominator, landmarks.transfer.numerator))
-    usable = (top > 0.0) & (bottom > 0.0)
-    return np.where(usable, top / np.where(usable, bottom, 1.0), 1.0)
-
-
-def _coefficients(p: FloatArray, place: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Coefficients at `place` (N,) and after it, of (N, m), zero where there are none."""
-    padded = np.concatenate([p, np.zeros((len(p), 2))], axis=-1)
-    first, second = (np.take_along_axis(padded, (place + i)[:, None], axis=-1)[:, 0] for i in (0, 1))
-    return first, second
+    angle = np.pi * np.where(turn > excess[:, None], turn - 2 * excess[:, None], turn) / excess[:, None]
+    angle = np.where(exists[:, None] & (np.arange(n) < excess[:, None]), angle, np.nan)
+    return np.where(exists, centroid, np.nan), np.sort(angle, axis=-1)
 
 
 def _significant(ratio: Transfer, s: ComplexArray, least: float) -> BoolArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.branches import continuous_branches
-from design.landmarks import Landmarks, asymptotes, breakaways, crossings, natural_gain
+from design.landmarks import Landmarks, asymptotes, breakaways, crossings
 from design.locus_poles import poles_along
 from design.loop import SisoLoop
 from model.arrays import ComplexArray, FloatArray, GridArrays
@@ -56,8 +56,8 @@ def root_locus(loop: SisoLoop, gains: FloatArray | None = None, count: int = 300
     ----------
     loop : arrays finite
     gains : (k,) or (*G, k), strictly monotonic; at least two. Without them: 0, then `count` - 1 gains from
-        a hundredth of the chosen gain to a hundred times it (of `natural_gain` where that is 0), in even
-        ratios, with the chosen gain itself and all crossings and breakaways in between among them
+        a hundredth of the chosen gain to a hundred times it (where that is 0, of a gain that moves the poles
+        fairly), in even ratios, with the chosen gain and all crossings and breakaways in between among them
     count : number of gains when they are not given, 0 included; at least ``6 n + 6``
 
     Raises
@@ -70,13 +70,12 @@ def root_locus(loop: SisoLoop, gains: FloatArray | None = None, count: int = 300
     chosen = loop.gain.reshape(-1)
     # Toward negative gains a locus is the one of the other sign.
     side = np.where(chosen < 0.0, -1.0, 1.0)
-    landmarks = Landmarks.of(A, b * (loop.sign * side)[:, None], c)
+    landmarks = Landmarks.of(A, b * (loop.sign * side)[:, None], c, np.abs(chosen))
     crossing, breakaway = crossings(landmarks), breakaways(landmarks)
     centroid, angles = asymptotes(landmarks)
     if gains is None:
-        centre = np.where(chosen == 0.0, natural_gain(landmarks), np.abs(chosen))
         special = np.concatenate([crossing.gain, breakaway.gain], axis=-1)
-        sampled = side[:, None] * _samples(centre, special, chosen != 0.0, count)
+        sampled = side[:, None] * _samples(landmarks.reference, special, chosen != 0.0, count)
     else:
         sampled = _checked(np.broadcast_to(gains, (*loop.gain.shape, np.shape(gains)[-1]))).reshape(len(A), -1)
     branches = continuous_branches(poles_along(A, loop.sign * b[:, :, None] * c[:, None, :], sampled))

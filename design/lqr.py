@@ -159,7 +159,7 @@ def _gains(plant: TrackingPlant, weights: ExplicitWeights, rest: SteadyState, ou
         K=solution.K,
         N=feed_forward(solution.K, rest),
         X=solution.X,
-        residual=solution.residual,
+        residual=np.where(solution.certified, solution.residual, np.nan),
         largest_real_part=growth,
         return_difference_min=kalman,
         outcomes=outcomes,

@@ -55,8 +55,11 @@ class Outcomes(GridArrays):
         outcome : what the points become
         reason : called with each point's index, says why in words and numbers
         """
+        failed = np.asarray(where) & self.ok
+        if not np.any(failed):
+            return self
         codes, reasons = self.codes.copy(), self.reasons.copy()
-        for row in np.argwhere(np.asarray(where) & self.ok):
+        for row in np.argwhere(failed):
             index = tuple(int(i) for i in row)
             codes[index], reasons[index] = outcome, reason(index)
         return Outcomes(codes, reasons)

@@ -103,6 +103,15 @@ def _cross_tables(length: int) -> tuple[FloatArray, FloatArray]:
     return real, imaginary[:, 1:]
 
 
+def with_roots(roots: ComplexArray) -> FloatArray:
+    """Monic polynomial (*G, n+1) with the roots (*G, n), complex ones in conjugate pairs."""
+    result = np.zeros((*roots.shape[:-1], roots.shape[-1] + 1), dtype=complex)
+    result[..., 0] = 1.0
+    for i in range(roots.shape[-1]):
+        result[..., 1 : i + 2] -= roots[..., i : i + 1] * result[..., : i + 1]
+    return result.real
+
+
 def leading_zeros(p: FloatArray) -> IntArray:
     """How many leading coefficients are exactly zero, (*G,); all of them for the zero polynomial."""
     nonzero = p != 0.0
@@ -135,7 +144,7 @@ def _nonzero_roots(p: FloatArray) -> ComplexArray:
     m = p.shape[-1] - 1
     if m == 0:
         return np.zeros((p.shape[0], 0), dtype=complex)
-    scale = power_of_two_scale(p)
+    scale = nearby_power_of_two(np.max(np.abs(p[:, 1:] / p[:, :1]) ** (1.0 / np.arange(1, m + 1)), axis=-1))
     scaled = p / p[:, :1] / scale[:, None] ** np.arange(m + 1)
     companion = np.zeros((p.shape[0], m, m))
     companion[:, np.arange(1, m), np.arange(m - 1)] = 1.0
@@ -144,13 +153,6 @@ def _nonzero_roots(p: FloatArray) -> ComplexArray:
     return values * scale[:, None]
 
 
-def power_of_two_scale(p: FloatArray) -> FloatArray:
-    """Power of two near the largest root of (*G, n+1) with a leading coefficient that is not zero, (*G,).
-
-    ``max |p_k / p_0|^(1/k)`` is within a factor 2n of the largest root. A power of two, so that scaling
-    rounds nothing; 1 when every root is zero.
-    """
-    degree = np.arange(1, p.shape[-1])
-    largest = np.max(np.abs(p[..., 1:] / p[..., :1]) ** (1.0 / degree), axis=-1, initial=0.0)
-    positive = np.where(largest > 0.0, largest, 1.0)
-    return np.exp2(np.round(np.log2(positive)))
+def nearby_power_of_two(size: FloatArray) -> FloatArray:
+    """Power of two next to each size > 0, so that to scale by it rounds nothing; 1 for 0."""
+    return np.exp2(np.round(np.log2(np.where(size > 0.0, size, 1.0))))

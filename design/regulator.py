@@ -8,14 +8,14 @@ from functools import cached_property
 import numpy as np
 
 from design.balance import balance_exponents
-from model.arrays import BoolArray, FloatArray, GridArrays, IntArray
+from model.arrays import BoolArray, FloatArray, IntArray
 
 #: Weights less symmetric than this, relative to their largest entry, are not a quadratic form.
 ASYMMETRY = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class RiccatiEquation(GridArrays):
+class RiccatiEquation:
     """``A'X + XA - X F F' X + Q = 0`` in states and a time scaled by powers of two (no rounding).
 
     Attributes
@@ -35,6 +35,12 @@ class RiccatiEquation(GridArrays):
     def G(self) -> FloatArray:
         """``F F'`` (N, n, n)."""
         return np.asarray(self.F @ self.F.mT)
+
+    def take(self, index: IntArray) -> RiccatiEquation:
+        """The equation at some of the points."""
+        return RiccatiEquation(
+            self.A[index], self.F[index], self.Q[index], self.state_exponent[index], self.time_exponent[index]
+        )
 
     def in_scale(self, matrix: FloatArray) -> FloatArray:
         """A closed-loop matrix (N, n, n) [1/s] in the scaled states and time; its eigenvalues only scale."""
@@ -65,14 +71,14 @@ class RiccatiEquation(GridArrays):
 
 
 @dataclass(frozen=True, eq=False)
-class RegulatorProblem(GridArrays):
+class RegulatorProblem:
     """Minimise ``int( x'Qx + u'Ru + 2x'Nu ) dt`` for ``x' = A x + B u``, over N points.
 
     Attributes
     ----------
     A (N, n, n), B (N, n, m) : the plant
-    S : (N, m, m) ``R^-1 = S S'``
-    cross : (N, m, n) ``R^-1 N'``; the gain is ``S F'X + cross``
+    S : (N or 1, m, m) ``R^-1 = S S'``
+    cross : (N or 1, m, n) ``R^-1 N'``; the gain is ``S F'X + cross``
     posed : (N,) data finite, Q and R symmetric, R positive definite; elsewhere `equation` is a harmless one
     equation : of ``A - B R^-1 N'`` and ``Q - N R^-1 N'``
     """
@@ -83,6 +89,12 @@ class RegulatorProblem(GridArrays):
     cross: FloatArray
     posed: BoolArray
     equation: RiccatiEquation
+
+    def take(self, index: IntArray) -> RegulatorProblem:
+        """The problem at some of the points."""
+        S = self.S if len(self.S) == 1 else self.S[index]
+        cross = self.cross if len(self.cross) == 1 else self.cross[index]
+        return RegulatorProblem(self.A[index], self.B[index], S, cross, self.posed[index], self.equation.take(index))
 
 
 def regulator_problem(
@@ -119,10 +131,10 @@ def regulator_problem(
     return RegulatorProblem(
         A=A,
         B=B,
-        S=np.broadcast_to(S, (len(A), m, m)),
-        cross=np.broadcast_to(cross, (len(A), m, n)),
+        S=S,
+        cross=cross,
         posed=posed,
-        equation=scaled_equation(reduced, F, np.broadcast_to(0.5 * (Q + Q.mT), A.shape)),
+        equation=scaled_equation(reduced, F, 0.5 * (Q + Q.mT)),
     )
 
 
@@ -164,12 +176,13 @@ def finite(matrix: FloatArray) -> BoolArray:
 
 def symmetric(matrix: FloatArray) -> BoolArray:
     """Mask of the points where the matrix is finite and symmetric."""
-    size, skew = np.abs(matrix).max(axis=(-2, -1)), np.abs(matrix - matrix.mT).max(axis=(-2, -1))
+    with np.errstate(invalid="ignore", over="ignore"):
+        size, skew = np.abs(matrix).max(axis=(-2, -1)), np.abs(matrix - matrix.mT).max(axis=(-2, -1))
     return np.asarray((skew <= ASYMMETRY * size) & np.isfinite(size))
 
 
 def scaled_equation(A: FloatArray, F: FloatArray, Q: FloatArray) -> RiccatiEquation:
-    """The equation of A (N, n, n), F (N, n, m), Q (N, n, n), balanced and with its Hamiltonian of order one."""
+    """The equation of A (N, n, n), F (N, n, m), Q (N or 1, n, n), balanced, its Hamiltonian of order one."""
     exponents = balance_exponents(A, F, Q)
     tau, size = exponents[:, :-1], exponents[:, -1]
     k = 2 * ((size + 1) // 2)

@@ -15,8 +15,8 @@ the residual with its rounding error, ``-W <= R(X) <= W``, and let P solve ``Ac'
     doubt = 4 trace(W^-1 P) trace(G P) < 1
 
 the Newton map sends the set ``-2P <= D <= 2P`` into itself, and P stays a Lyapunov function on all of it: the
-exact stabilising solution lies within 2P of X. `doubt` is about the largest relative error of a closed-loop
-pole's damping, so it has to be much smaller than 1.
+exact stabilising solution lies within 2P of X. `doubt` is also about the largest relative error of a closed-loop
+pole's damping, so it is asked to be far below 1, which leaves room for the rounding of P itself too.
 
 *Two witnesses.* With weights many decades apart the proof is too pessimistic. Then eigenvectors and scipy, two
 algorithms with different rounding, must agree on the gain and on the damping of every pole, and the rank tests
@@ -76,11 +76,12 @@ class RiccatiSolution(GridArrays):
 class _Candidate:
     """A candidate over N points, after a Newton step.
 
-    X : (N, n, n) of the scaled equation; K : (N, m, n) in the states' units; poles : (N, n) of ``A - B K``
+    X : (N, n, n) of the scaled equation; X_states, K : in the states' units; poles : (N, n) of ``A - B K``
     sound : stable, positive semidefinite, small residual; proved : sound, and with little doubt
     """
 
     X: FloatArray
+    X_states: FloatArray
     K: FloatArray
     poles: FloatArray
     residual: FloatArray
@@ -116,7 +117,7 @@ def solve_riccati(
         if doubtful.size:
             first, solver = _second_opinion(problem, first, solver, doubtful)
             certified = solver != "none"
-        X, K, residual = problem.equation.solution_in_states(first.X), first.K, first.residual
+        X, K, residual = first.X_states, first.K, first.residual
     if not certified.all():
         X[~certified], K[~certified] = np.nan, np.nan
         residual = np.where(problem.posed, residual, np.nan)
@@ -136,7 +137,8 @@ def _judged(problem: RegulatorProblem, X: FloatArray) -> _Candidate:
     X, residual, doubt = _newton(equation, X)
     K = problem.S @ equation.feedback_in_states(X) + problem.cross
     closed = equation.in_scale(problem.A - problem.B @ K)
-    usable = problem.posed & finite(closed) & finite(equation.solution_in_states(X))
+    X_states = equation.solution_in_states(X)
+    usable = problem.posed & finite(closed) & finite(X_states)
     if not usable.all():
         closed[~usable] = 0.0
     poles = np.sort(np.linalg.eigvals(closed).real, axis=-1)
@@ -149,7 +151,7 @@ def _judged(problem: RegulatorProblem, X: FloatArray) -> _Candidate:
         & (spectrum[:, 0] >= -NEGATIVE * np.abs(spectrum[:, -1]))
     )
     poles = np.ldexp(poles, equation.time_exponent[:, None])
-    return _Candidate(X, K, poles, residual, sound, sound & (doubt <= MAX_DOUBT))
+    return _Candidate(X, X_states, K, poles, residual, sound, sound & (doubt <= MAX_DOUBT))
 
 
 def _newton(equation: RiccatiEquation, X: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -234,14 +236,14 @@ def _second_opinion(
     problem = problem.take(doubtful)
     equation = problem.equation
     eigen = _judged(problem, _newton(equation, first.X[doubtful])[0])
-    scipy_X = np.stack([_scipy_candidate(equation.take(i)) for i in range(len(doubtful))])
+    scipy_X = np.stack([_scipy_candidate(*point) for point in zip(equation.A, equation.F, equation.Q, strict=True)])
     other = _judged(problem, _newton(equation, scipy_X)[0])
     by_scipy = other.proved & ~eigen.proved
     believed = eigen.proved | by_scipy | _agree(problem, eigen, other)
     solver[doubtful[believed]] = "eigenvectors"
     solver[doubtful[by_scipy]] = "scipy"
     values = {}
-    for name in ("X", "K", "poles", "residual", "sound", "proved"):
+    for name in ("X", "X_states", "K", "poles", "residual", "sound", "proved"):
         values[name] = getattr(first, name).copy()
         mine, theirs = getattr(eigen, name), getattr(other, name)
         values[name][doubtful] = np.where(by_scipy.reshape(-1, *[1] * (mine.ndim - 1)), theirs, mine)
@@ -261,11 +263,10 @@ def _agree(problem: RegulatorProblem, one: _Candidate, other: _Candidate) -> Boo
     return np.asarray(same & (distance >= CLEARLY_SOLVABLE))
 
 
-def _scipy_candidate(equation: RiccatiEquation) -> FloatArray:
+def _scipy_candidate(A: FloatArray, F: FloatArray, Q: FloatArray) -> FloatArray:
     """Solution by scipy at one point (n, n), symmetric; nan where it raises."""
-    inputs = equation.F.shape[-1]
     try:
-        X = scipy.linalg.solve_continuous_are(equation.A, equation.F, equation.Q, np.eye(inputs))
+        X = scipy.linalg.solve_continuous_are(A, F, Q, np.eye(F.shape[-1]))
     except (np.linalg.LinAlgError, ValueError):
-        return np.full(equation.A.shape, np.nan)
+        return np.full(A.shape, np.nan)
     return np.asarray(0.5 * (X + X.T))

@@ -95,7 +95,7 @@ def problem_solvability(problem: RegulatorProblem) -> Solvability:
         elif control[i] <= RANK:
             reasons[i] = f"(A, B) is not stabilisable: no input reaches the mode at {_rate(uncontrolled[i])} 1/s"
         else:
-            matrix = "Q - N R^-1 N'" if np.any(problem.cross[i]) else "Q"
+            matrix = "Q - N R^-1 N'" if np.any(problem.cross) else "Q"
             reasons[i] = (
                 f"{matrix} does not see the mode at {_rate(unobserved[i])} 1/s on the imaginary axis: "
                 "no stabilising solution; give that mode a weight"

@@ -50,7 +50,7 @@ class SteadyState(GridArrays):
 
 
 def augment_with_integral(model: LinearModel) -> TrackingPlant:
-    """The model's plant with ``int_a' = r_a - da`` as one more state (controllers.md 3, seed 5.3)."""
+    """The model's plant with ``int_a' = r_a - da`` as one more state (seed 5.3)."""
     n, aileron = len(model.states), model.states.index("da")
     grid = model.A.shape[:-2]
     A, B, E = np.zeros((*grid, n + 1, n + 1)), np.zeros((*grid, n + 1, 2)), np.zeros((*grid, n + 1, 1))

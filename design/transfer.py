@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.polynomials import leading_zeros, power_of_two_scale, roots
+from design.polynomials import leading_zeros, roots, with_roots
 from model.arrays import ComplexArray, FloatArray, GridArrays, IntArray
 
 
@@ -15,8 +15,7 @@ class Transfer(GridArrays):
     """``numerator(s) / denominator(s)``, highest power first, both (*G, n+1), denominator monic.
 
     Nothing is cancelled: a mode that the input does not reach or the output does not see is a root of both
-    (an integral that the opened loop does not feed back, say). `without_common_origin` cancels the ones at
-    the origin, and only when asked.
+    (an integral that the opened loop does not feed back, say).
 
     Attributes
     ----------
@@ -37,58 +36,78 @@ class Transfer(GridArrays):
         """Number of poles less that of zeros (*G,); n+1 when the response is zero throughout."""
         return leading_zeros(self.numerator)
 
-    @property
-    def frequency_scale(self) -> FloatArray:
-        """Power of two near the largest pole (*G,) [rad/s], for `scaled`."""
-        return power_of_two_scale(self.denominator)
-
     def scaled(self, frequency: FloatArray) -> Transfer:
         """The same transfer as a function of ``s / frequency``, frequency (*G,) [rad/s]."""
         powers = frequency[..., None] ** np.arange(self.denominator.shape[-1])
         return Transfer(self.numerator / powers, self.denominator / powers)
 
-    def without_common_origin(self) -> Transfer:
-        """The same transfer with the common factors s cancelled; the degrees are lowered, not the lengths."""
-        tails = [leading_zeros(p[..., ::-1]) for p in (self.numerator, self.denominator)]
-        shift = np.minimum(tails[0], tails[1])
-        index = np.arange(self.denominator.shape[-1]) - shift[..., None]
-        kept = index >= 0
-        return Transfer(
-            *(
-                np.where(kept, np.take_along_axis(p, np.maximum(index, 0), axis=-1), 0.0)
-                for p in (self.numerator, self.denominator)
-            )
-        )
-
 
 def transfer(A: FloatArray, b: FloatArray, c: FloatArray) -> Transfer:
-    """``c (sI - A)^-1 b`` by Leverrier's method in Faddeev's form (Gantmacher 1959, IV.5).
-
-    ``M_1 = I``, ``d_k = -tr(A M_k) / k``, ``M_k+1 = A M_k + d_k I``; the numerator's coefficients are
-    ``c M_k b``. No scaling of the states by powers of two changes a single rounding of it. Beside the
-    products run those of the magnitudes; a coefficient that is smaller than the rounding of its own terms
-    is exactly zero, so that missing leading terms (relative degree) and integrators come out as such.
+    """``c (sI - A)^-1 b`` from the poles without and with feedback of the `natural_gain`.
 
     Parameters
     ----------
-    A : (*G, n, n), b : (*G, n), c : (*G, n)
+    A : (*G, n, n), b : (*G, n), c : (*G, n), finite
+    """
+    poles = np.linalg.eigvals(A).astype(complex)
+    gain = natural_gain(A, b, c, poles)
+    moved = np.linalg.eigvals(A - gain[..., None, None] * b[..., :, None] * c[..., None, :])
+    return transfer_of_poles(poles, moved.astype(complex), gain, markov_parameters(A, b, c))
+
+
+def natural_gain(A: FloatArray, b: FloatArray, c: FloatArray, poles: ComplexArray) -> FloatArray:
+    """Gain (*G,) at which ``|k L| = 1`` amid the poles (*G, n) of A: one that moves them fairly; 1 if none does."""
+    size, norm = np.abs(poles), np.linalg.norm(A, axis=(-2, -1))
+    largest = np.max(size, axis=-1)
+    # Poles that are all at the origin are so within rounding only; then any unit of time will do.
+    largest = np.where(largest > 1e-6 * norm, largest, np.where(norm > 0.0, norm, 1.0))[..., None]
+    # The geometric mean of the distances, in a direction in which there hardly is a pole.
+    s = np.exp(np.mean(np.log(np.maximum(size, 1e-3 * largest)), axis=-1, keepdims=True) + 0.9j)
+    strength = np.abs(response(A, b, c, s).value[..., 0])
+    reached = strength > 0.0
+    return np.where(reached, 1.0 / np.where(reached, strength, 1.0), 1.0)
+
+
+def transfer_of_poles(
+    open_poles: ComplexArray, closed_poles: ComplexArray, gain: FloatArray, markov: FloatArray
+) -> Transfer:
+    """Transfer whose poles are at the one place without feedback and at the other with `gain`.
+
+    The numerator is ``(p_closed - p_open) / gain``, p being the characteristic polynomials. Poles keep their
+    digits when they are spread over many decades, where the classical recursions on powers of A lose them;
+    what the difference loses belongs to frequencies where the loop is far weaker than rounding.
+
+    Parameters
+    ----------
+    open_poles, closed_poles : (*G, n)
+    gain : (*G,), not 0
+    markov : (*G, n+1) of `markov_parameters`: the leading coefficients that are zero, and the first that is not
+    """
+    n = open_poles.shape[-1]
+    denominator = with_roots(open_poles)
+    numerator = (with_roots(closed_poles) - denominator) / gain[..., None]
+    markov = markov[..., :n]
+    first = leading_zeros(markov)[..., None]
+    place = np.arange(n)
+    numerator[..., 0] = 0.0
+    numerator[..., 1:] = np.where(place > first, numerator[..., 1:], np.where(place == first, markov, 0.0))
+    return Transfer(numerator, denominator)
+
+
+def markov_parameters(A: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """``c b, c A b, .. c A^n b`` (*G, n+1): ``c (sI - A)^-1 b = sum h_i / s^i``.
+
+    One that is smaller than the rounding of its own terms is exactly zero, so that a chain of k integrations
+    between input and output shows as k - 1 zeros.
     """
     n = A.shape[-1]
-    identity = np.eye(n)
-    matrices, columns, rows = (np.stack([m, np.abs(m)]) for m in (A, b[..., None], c[..., None, :]))
-    adjugate: FloatArray = np.broadcast_to(identity, matrices.shape)
-    signs = np.reshape([-1.0, 1.0], (2, *(1,) * (A.ndim - 2)))
-    denominator, numerator = np.zeros((2, *A.shape[:-2], n + 1)), np.zeros((2, *A.shape[:-2], n + 1))
-    denominator[0, ..., 0] = 1.0
-    for k in range(1, n + 1):
-        numerator[..., k] = (rows @ adjugate @ columns)[..., 0, 0]
-        product = matrices @ adjugate
-        denominator[..., k] = signs * np.trace(product, axis1=-2, axis2=-1) / k
-        adjugate = product + denominator[..., k, None, None] * identity
-    rounding = 8.0 * n * np.finfo(float).eps
-    return Transfer(
-        *(np.where(np.abs(value) > rounding * bound, value, 0.0) for value, bound in (numerator, denominator))
-    )
+    matrices, vector, rows = (np.stack([m, np.abs(m)]) for m in (A, b[..., None], c[..., None, :]))
+    result = np.empty((2, *b.shape[:-1], n + 1))
+    for k in range(n + 1):
+        result[..., k] = (rows @ vector)[..., 0, 0]
+        vector = matrices @ vector
+    value, bound = result
+    return np.where(np.abs(value) > 8.0 * n * np.finfo(float).eps * bound, value, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,7 +51,7 @@ class GridArrays:
 
 def _take(value: Any, index: Any) -> Any:
     if isinstance(value, np.ndarray):
-        return value[index]
+        return np.asarray(value[index], dtype=value.dtype)  # one point of G = () is an array too
     if isinstance(value, GridArrays):
         return value.take(index)
     if isinstance(value, tuple) and value and all(is_dataclass(v) for v in value):

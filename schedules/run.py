@@ -16,6 +16,8 @@ from design.outcome import Outcome, Outcomes
 from design.poles import largest_real_part
 from design.specs import Spec, Verdict
 from design.tab_loop import tab_loop
+from design.weights import WeightsRefused
+from model.arrays import FloatArray
 from schedules.analysis import EnvelopeWarning, PlantEnvelope, analyse
 from schedules.study import Controller, Study
 
@@ -61,13 +63,28 @@ class DesignedEnvelope:
         raise KeyError(name)
 
 
+class ControllerRefused(ValueError):
+    """A controller that cannot work at any point of the grid.
+
+    Attributes
+    ----------
+    controller : its name
+    refused : what its weights lack
+    """
+
+    def __init__(self, controller: str, refused: WeightsRefused) -> None:
+        super().__init__(f"controller {controller}: {refused}")
+        self.controller = controller
+        self.refused = refused
+
+
 def run(study: Study) -> DesignedEnvelope:
     """Design and judge every controller of a study over its grid.
 
     Raises
     ------
     ValueError : the grid cannot be built
-    design.weights.WeightsRefused : weights that cannot work at any point
+    ControllerRefused : weights that cannot work at any point
     """
     plant = analyse(study)
     controllers = tuple(_design(study, plant, request) for request in study.controllers)
@@ -99,7 +116,10 @@ def _classical(study: Study, plant: PlantEnvelope, request: ClassicalController)
 
 
 def _lqr(study: Study, plant: PlantEnvelope, request: LqrController) -> DesignedController:
-    design = design_lqr(plant.model, request, plant.outcomes)
+    try:
+        design = design_lqr(plant.model, request, plant.outcomes)
+    except WeightsRefused as refused:
+        raise ControllerRefused(request.name, refused) from refused
     loop = lqr_loop(plant.model, design)
     return _judged(study, request, design.outcomes, _matrix_gains(loop, plant.model.inputs), loop, design)
 
@@ -116,15 +136,32 @@ def _judged(
     ok = outcomes.ok
     if not np.any(ok):
         return DesignedController(request, outcomes, gains, loop, None, (), riccati)
-    step = np.array([study.reference.aileron])
-    found = assess(loop.take(ok), step, horizon(study, request)).spread(ok)
-    checked = _certify(outcomes, found, _asked(request))
+    step, duration = np.array([study.reference.aileron]), horizon(study, request)
+    try:
+        found = assess(loop.take(ok), step, duration).spread(ok)
+        checked = _certify(outcomes, found, _asked(request))
+    except np.linalg.LinAlgError:
+        checked = _without_unjudgeable(outcomes, loop, step, duration)
     if not np.array_equal(checked.ok, ok):
         kept = loop.take(checked.ok).spread(checked.ok)
         return _judged(study, request, checked, _kept(gains, checked), kept, riccati)
     actuators = {"tab": study.tab_actuator, "aileron": study.aileron_actuator}
     said = verdicts(found, ok, _asked(request), study.spec_pack, actuators)
     return DesignedController(request, outcomes, gains, loop, found, said, riccati)
+
+
+def _without_unjudgeable(outcomes: Outcomes, loop: Loop, step: FloatArray, duration: float) -> Outcomes:
+    """One point whose numbers LAPACK gives up on must not lose the others: find such points one by one."""
+    reasons = np.full(outcomes.ok.shape, None, dtype=object)
+    for index in map(tuple, np.argwhere(outcomes.ok)):
+        try:
+            assess(loop.take(index), step, duration)
+        except np.linalg.LinAlgError as error:
+            reasons[index] = str(error)
+    failed = np.asarray(reasons != None)  # noqa: E711, elementwise
+    if not np.any(failed):
+        raise AssertionError("the grid could not be judged, but each of its points could")
+    return outcomes.failing(failed, Outcome.NOT_CERTIFIED, lambda index: f"the loop cannot be judged: {reasons[index]}")
 
 
 def _certify(outcomes: Outcomes, found: Assessment, asked: tuple[Spec, ...]) -> Outcomes:

@@ -7,9 +7,8 @@ from contextlib import asynccontextmanager
 
 from anyio import Semaphore
 from fastapi import FastAPI
-from fastapi_offline import FastAPIOffline
 
-from service import errors, openapi
+from service import errors, openapi, pages
 from service.body_limit import BodyLimit
 from service.designs import Designs, design_id
 from service.examples import NAMES, example
@@ -20,9 +19,6 @@ from service.settings import Settings
 from service.state import State
 from service.store import DesignStore
 from service.version import release
-
-#: Swagger UI: ready to try, searchable, and silent towards the validator it would ask on the internet.
-SWAGGER = {"tryItOutEnabled": True, "filter": True, "displayRequestDuration": True, "validatorUrl": None}
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -41,16 +37,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         finally:
             designs.close()
 
-    app: FastAPI = FastAPIOffline(
+    app = FastAPI(
         title="Gainfield",
         version=release(),
         description=openapi.DESCRIPTION,
         lifespan=lifespan,
-        swagger_ui_parameters=SWAGGER,
+        docs_url=None,
+        redoc_url=None,
         license_info={"name": "MIT", "identifier": "MIT"},
     )
     for router in ROUTERS:
         app.include_router(router)
+    pages.install(app)
     errors.install(app)
     openapi.install(app, example_id)
     app.add_middleware(BodyLimit, limit=chosen.max_body_bytes)

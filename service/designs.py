@@ -11,11 +11,11 @@ from typing import TypeVar
 import numpy as np
 import orjson
 
-from design.lqr import LqrController, design_lqr
-from design.weights import ExplicitWeights, WeightsRefused
+from design.lqr import LqrController
+from design.weights import ExplicitWeights
 from model.arrays import FloatArray
 from schedules.analysis import PlantEnvelope, analyse
-from schedules.run import DesignedController, DesignedEnvelope, run
+from schedules.run import ControllerRefused, DesignedController, DesignedEnvelope, run
 from schedules.schedule import Provenance
 from schedules.study import PlantStudy, Study
 from service import study_of
@@ -71,7 +71,7 @@ class Designs:
         Raises
         ------
         InvalidRequest : no point of the grid lies inside the model, or the model refuses the numbers
-        WeightsRefused : the weights of a controller cannot work
+        InvalidRequest : the weights of a controller cannot work
         """
         ident = design_id(request)
         found = self._store.get(ident)
@@ -125,27 +125,22 @@ def _asked(study: StudyKind, function: Callable[[StudyKind], Result]) -> Result:
     check_envelope(study)
     try:
         return function(study)
-    except WeightsRefused:
-        raise _weights_refusal(study) from None
+    except ControllerRefused as error:
+        raise _weights_refusal(study, error) from error
     except (ValueError, ArithmeticError) as error:
         log.warning("a study was refused by the model", exc_info=error)
         raise InvalidRequest(f"the model cannot answer for these numbers: {error}") from error
 
 
-def _weights_refusal(study: PlantStudy) -> InvalidRequest:
+def _weights_refusal(study: PlantStudy, error: ControllerRefused) -> InvalidRequest:
     """The refusal of weights that cannot work, pointing at the matrix of the controller that has them."""
-    plant = analyse(study)
-    for place, wanted in enumerate(study.controllers if isinstance(study, Study) else ()):
-        if not isinstance(wanted, LqrController):
-            continue
-        try:
-            design_lqr(plant.model, wanted, plant.outcomes)
-        except WeightsRefused as refused:
-            explicit = isinstance(wanted.weights, ExplicitWeights)
-            pointer = f"/controllers/{place}/weights" + (f"/{refused.matrix}" if explicit else "")
-            field = FieldRefusal(pointer, f"{refused.matrix}: {refused.reason}", "SI", WORKING_WEIGHTS)
-            return InvalidRequest(f"{pointer}: {field.detail}", field)
-    raise AssertionError("weights were refused by a run and by none of its controllers")
+    controllers = study.controllers if isinstance(study, Study) else ()
+    place = [wanted.name for wanted in controllers].index(error.controller)
+    wanted, refused = controllers[place], error.refused
+    explicit = isinstance(wanted, LqrController) and isinstance(wanted.weights, ExplicitWeights)
+    pointer = f"/controllers/{place}/weights" + (f"/{refused.matrix}" if explicit else "")
+    field = FieldRefusal(pointer, f"{refused.matrix}: {refused.reason}", "SI", WORKING_WEIGHTS)
+    return InvalidRequest(f"{pointer}: {field.detail}", field)
 
 
 def _stored(ident: str, request: DesignRequest, envelope: DesignedEnvelope) -> StoredDesign:

@@ -19,6 +19,7 @@ LIMITS = {
     "max_grid_points": "1",
     "max_controllers": "1",
     "max_point_designs": "1",
+    "max_tab_only_designs": "1",
     "max_locus_gains": "1",
     "max_response_samples": "1",
     "max_listed_designs": "1",
@@ -81,6 +82,8 @@ def check_design(request: DesignRequest, settings: Settings) -> None:
     check_size("/controllers", "controllers", controllers, "max_controllers", settings)
     work = points * controllers
     check_size("/grid", "grid points times controllers", work, "max_point_designs", settings)
+    searches = points * sum(wanted.kind != "lqr" for wanted in request.controllers)
+    check_size("/grid", "grid points times tab-only controllers", searches, "max_tab_only_designs", settings)
 
 
 def check_envelope(study: PlantStudy) -> None:

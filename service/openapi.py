@@ -65,7 +65,10 @@ def install(app: FastAPI, example_id: Callable[[], str]) -> None:
                 [(Problem, "serialization"), (FieldProblem, "serialization")],
                 ref_template="#/components/schemas/{model}",
             )
-            document["components"]["schemas"].update(definitions["$defs"])
+            schemas = document["components"]["schemas"]
+            schemas.update(definitions["$defs"])
+            for unused in ("HTTPValidationError", "ValidationError"):
+                schemas.pop(unused, None)
             for path, operations in document["paths"].items():
                 for method, operation in operations.items():
                     _complete(path, method, operation, example_id())
@@ -83,6 +86,9 @@ def _complete(path: str, method: str, operation: dict[str, Any], example_id: str
     for parameter in parameters:
         if parameter["name"] == "id":
             parameter["example"] = example_id
+    # The framework declares its own 422 where no parameter of ours can be refused.
+    if MEDIA_TYPE not in operation["responses"].get("422", {}).get("content", {MEDIA_TYPE: None}):
+        del operation["responses"]["422"]
     if "requestBody" in operation:
         operation["requestBody"]["content"]["application/json"]["examples"] = _bodies(path)
 

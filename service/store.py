@@ -78,10 +78,14 @@ class DesignStore:
         self._connection = sqlite3.connect(
             data_dir / FILE_NAME, timeout=PATIENCE, isolation_level=None, check_same_thread=False
         )
-        with self._cursor() as cursor:
-            cursor.execute("PRAGMA journal_mode = WAL")
-            cursor.execute("PRAGMA synchronous = FULL")
-            self._lay_out(cursor)
+        try:
+            with self._cursor() as cursor:
+                cursor.execute("PRAGMA journal_mode = WAL")
+                cursor.execute("PRAGMA synchronous = FULL")
+                self._lay_out(cursor)
+        except StoreUnavailable:
+            self.close()
+            raise
 
     def _lay_out(self, cursor: sqlite3.Cursor) -> None:
         cursor.execute("BEGIN IMMEDIATE")

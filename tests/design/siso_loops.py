@@ -34,3 +34,10 @@ def same(a, b, tolerance=1e-9):
     a, b = np.asarray(a), np.asarray(b)
     scale = np.maximum(1.0, np.abs(np.where(np.isfinite(b), b, 0.0)))
     np.testing.assert_allclose(a / scale, b / scale, rtol=0.0, atol=tolerance)
+
+
+def in_other_states(loop, seed):
+    """The same loop in random states: what was exactly zero is only zero within rounding."""
+    n = loop.A.shape[-1]
+    T = np.linalg.qr(np.random.default_rng(seed).standard_normal((n, n)))[0]
+    return SisoLoop(loop.name, T.T @ loop.A @ T, T.T @ loop.b, loop.c @ T, loop.gain, loop.sign, loop.delay)

@@ -33,8 +33,8 @@ def judged(plant_a, tab_actuator):
         ("damping_ratio", 1e-8),
         ("gain_margin", 1e-5),
         ("phase_margin", 1e-5),
-        ("settling_time", 2e-3),
-        ("overshoot", 2e-3),
+        ("settling_time", 1e-4),
+        ("overshoot", 1e-6),
     ],
 )
 def test_figures_are_close_to_the_exact_ones(judged, quantity, tolerance):

@@ -26,3 +26,8 @@ def test_outcomes_are_read_only_and_the_original_is_untouched():
     assert original.ok.all()
     assert not original.codes.flags.writeable
     assert original.codes[0] is Outcome.OK
+
+
+def test_one_point_of_a_grid_can_fail_too():
+    one = Outcomes.all_ok((2, 2)).take((0, 1)).failing(np.array(True), Outcome.INFEASIBLE, lambda index: "no")
+    assert one.codes[()] is Outcome.INFEASIBLE

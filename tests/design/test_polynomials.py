@@ -6,19 +6,20 @@ from design.polynomials import (
     imaginary_cross,
     leading_zeros,
     magnitude_bound,
-    power_of_two_scale,
+    nearby_power_of_two,
     powers,
     product,
     real_cross,
     roots,
     squared_magnitude,
     with_derivatives,
+    with_roots,
 )
 
 RNG = np.random.default_rng(7)
 
 
-@pytest.mark.parametrize("length", [1, 2, 3, 6, 7])
+@pytest.mark.parametrize("length", [2, 3, 6, 7])
 def test_values_on_the_axis(length):
     p, q = RNG.standard_normal((2, 4, length))
     w = RNG.uniform(0.1, 2.0, (4, 5))
@@ -82,9 +83,10 @@ def test_roots_of_a_grid_equal_those_of_its_points():
         np.testing.assert_allclose(found[i], roots(p[i]), rtol=1e-10)
 
 
-def test_scale_is_a_power_of_two_near_the_largest_root():
-    wanted = np.array([[-0.1, -3.0, -700.0], [0.0, 0.0, 0.0]])
-    scale = power_of_two_scale(np.array([np.poly(r) for r in wanted]))
-    assert np.all(np.log2(scale) % 1.0 == 0.0)
-    assert 350.0 <= scale[0] <= 1500.0
-    assert scale[1] == 1.0
+def test_nearby_power_of_two():
+    assert nearby_power_of_two(np.array([700.0, 1.0, 0.0, 0.3])).tolist() == [512.0, 1.0, 1.0, 0.25]
+
+
+def test_polynomial_of_its_roots():
+    wanted = np.array([[-1.0, -2.0 + 3.0j, -2.0 - 3.0j, 4.0], [0.0, 0.0, 1e3j, -1e3j]])
+    np.testing.assert_allclose(with_roots(wanted), [np.poly(r).real for r in wanted], rtol=1e-13)

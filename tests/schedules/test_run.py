@@ -9,8 +9,8 @@ from design.classical import ClassicalController
 from design.gains import Gain
 from design.outcome import Outcome
 from design.specs import Spec
-from design.weights import ExplicitWeights, WeightsRefused
-from schedules.run import run
+from design.weights import ExplicitWeights
+from schedules.run import ControllerRefused, run
 from schedules.study import GridRequest
 
 
@@ -117,8 +117,29 @@ def test_weights_that_cannot_work_are_refused(wind_tunnel_study):
     lqr = wind_tunnel_study.controllers[2]
     R = np.diag([1.0, -1.0])
     bad = replace(lqr, weights=ExplicitWeights(np.eye(5), R, None))
-    with pytest.raises(WeightsRefused, match="R"):
+    with pytest.raises(ControllerRefused, match="lqr: R") as error:
         run(replace(wind_tunnel_study, controllers=(bad,)))
+    assert error.value.controller == "lqr"
+    assert error.value.refused.matrix == "R"
+
+
+def test_a_point_that_cannot_be_judged_is_withdrawn_alone(wind_tunnel_study, monkeypatch):
+    import schedules.run as room
+
+    real = room.assess
+
+    def fails_at_the_fastest(loop, *arguments):
+        if np.max(np.sum(np.abs(loop.A), axis=(-1, -2))) >= worst:
+            raise np.linalg.LinAlgError("Eigenvalues did not converge")
+        return real(loop, *arguments)
+
+    study = replace(wind_tunnel_study, controllers=wind_tunnel_study.controllers[2:])
+    worst = np.max(np.sum(np.abs(run(study).controllers[0].loop.A), axis=(-1, -2)))
+    monkeypatch.setattr(room, "assess", fails_at_the_fastest)
+    outcomes = run(study).controllers[0].outcomes
+    assert np.sum(~outcomes.ok) == 1
+    assert outcomes.codes[~outcomes.ok][0] == Outcome.NOT_CERTIFIED
+    assert "did not converge" in outcomes.reasons[~outcomes.ok][0]
 
 
 def test_the_same_study_gives_the_same_numbers(wind_tunnel_study, wind_tunnel_envelope):

@@ -62,7 +62,13 @@ def test_no_answer_goes_through_the_generic_encoder(
     monkeypatch.setattr("starlette.responses.JSONResponse.render", broken)
     assert client.get("/openapi.json").status_code == 500
     here = f"/v1/designs/{design['id']}"
-    for path in (here, f"{here}/points/0", f"{here}/controllers/lqr/actuator-requirements", "/v1/designs", "/v1/limits"):
+    for path in (
+        here,
+        f"{here}/points/0",
+        f"{here}/controllers/lqr/actuator-requirements",
+        "/v1/designs",
+        "/v1/limits",
+    ):
         assert client.get(path).status_code == 200
     assert client.post("/v1/designs", json=design["request"]).status_code == 200
     assert client.post("/v1/designs", json={}).status_code == 422

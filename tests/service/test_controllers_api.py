@@ -101,7 +101,9 @@ def test_margins_are_explained(point: dict[str, Any]) -> None:
     [("nf", None), ("nf", "K_d"), ("nf", "K_p"), ("nf", "K_i"), ("nf", "tab"), ("pf", "K_f"), ("lqr", "aileron")],
 )
 def test_root_locus(client: TestClient, here: str, point: dict[str, Any], name: str, loop: str | None) -> None:
-    response = client.get(f"{here}/controllers/{name}/root-locus", params={"point": 3} | ({"loop": loop} if loop else {}))
+    response = client.get(
+        f"{here}/controllers/{name}/root-locus", params={"point": 3} | ({"loop": loop} if loop else {})
+    )
     locus = answers.RootLocus.model_validate(response.json()).model_dump()
     branches = complex_array(locus["branches"])
     assert locus["loop"] == (loop or "K_d")
