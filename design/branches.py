@@ -17,14 +17,13 @@ def continuous_branches(values: ComplexArray) -> ComplexArray:
     """
     N, K, n = values.shape
     follows = successors(values)
-    moved = np.any(follows != np.arange(n), axis=(0, 2))
     place = np.broadcast_to(np.arange(n), (N, n))
     places = np.empty((N, K, n), dtype=np.int64)
-    places[:, 0] = place
-    for k in range(K - 1):
-        if moved[k]:
-            place = np.take_along_axis(follows[:, k], place, axis=-1)
-        places[:, k + 1] = place
+    done = 0
+    for k in np.flatnonzero(np.any(follows != np.arange(n), axis=(0, 2))).tolist():
+        places[:, done : k + 1] = place[:, None]
+        place, done = np.take_along_axis(follows[:, k], place, axis=-1), k + 1
+    places[:, done:] = place[:, None]
     return np.swapaxes(np.take_along_axis(values, places, axis=-1), 1, 2)
 
 
@@ -35,13 +34,45 @@ def successors(values: ComplexArray) -> IntArray:
     squared distance is found exactly (squares, so that real poles never overtake each other). All pairs of
     neighbours are matched at once.
     """
-    apart = values[:, :-1, :, None] - values[:, 1:, None, :]
+    N, K, n = values.shape
+    follows = np.empty((N, K - 1, n), dtype=np.int64)
+    follows[...] = np.arange(n)
+    changed = ~_in_place(values)
+    follows[changed] = continuations(values[:, :-1][changed], values[:, 1:][changed])
+    return follows
+
+
+def continuations(before: ComplexArray, after: ComplexArray) -> IntArray:
+    """Places in `after` (L, n) of what continues the values `before` (L, n); see `successors`."""
+    apart = before[:, :, None] - after[:, None, :]
     squared = apart.real**2 + apart.imag**2
     follows: IntArray = squared.argmin(axis=-1)
-    for index in np.argwhere(~_is_permutation(follows)):
-        at = tuple(index)
-        follows[at] = _assignment(squared[at])
+    for i in np.flatnonzero(~_is_permutation(follows)):
+        follows[i] = _assignment(squared[i])
     return follows
+
+
+def _in_place(values: ComplexArray) -> BoolArray:
+    """Mask (N, K-1) of the pairs of lists in which each place is nearest to itself.
+
+    It is where each moves by less than half its distance to the nearest other.
+    """
+    s = np.ascontiguousarray(np.moveaxis(values, -1, 0))
+    step = s[:, :, 1:] - s[:, :, :-1]
+    near = 4.0 * (step.real**2 + step.imag**2) < squared_gaps(s)[:, :, :-1]
+    return np.asarray(near.all(axis=0))
+
+
+def squared_gaps(s: ComplexArray) -> FloatArray:
+    """``|s_i - s_j|^2`` to the nearest other along the first axis, the shape of s (n, ...); infinite for n = 1."""
+    gaps = np.full(s.shape, np.inf)
+    for i in range(len(s)):
+        for j in range(i):
+            apart = s[i] - s[j]
+            squared = apart.real**2 + apart.imag**2
+            np.minimum(gaps[i], squared, out=gaps[i])
+            np.minimum(gaps[j], squared, out=gaps[j])
+    return gaps
 
 
 def _is_permutation(follows: IntArray) -> BoolArray:

@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from design.loop import SisoLoop
-from design.polynomials import nearby_power_of_two
+from design.polynomials import nearby_power_of_two, with_roots
 from design.transfer import Transfer, markov_parameters, response, transfer_of_poles
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
 
@@ -62,16 +62,18 @@ def closed_loop(loop: SisoLoop) -> ClosedLoop:
     A, c = loop.A.reshape(-1, n, n), loop.c.reshape(-1, n)
     b = loop.b.reshape(-1, n) * (loop.sign * loop.gain.reshape(-1))[:, None]
     closed = A - b[:, :, None] * c[:, None, :]
-    poles, open_poles = (np.linalg.eigvals(m).astype(complex) for m in (closed, A))
+    poles: ComplexArray = np.linalg.eigvals(closed).astype(complex)
+    open_poles: ComplexArray = np.linalg.eigvals(A).astype(complex)
     scale = nearby_power_of_two(np.maximum(np.abs(poles), np.abs(open_poles)).max(axis=-1))
     open_loop = transfer_of_poles(open_poles, poles, np.ones_like(scale), markov_parameters(A, b, c))
     ratio = open_loop.scaled(scale)
     closed, b = closed / scale[:, None, None], b / scale[:, None]
-    poles = (poles / scale[:, None]).astype(complex)
+    poles = np.asarray(poles / scale[:, None], dtype=complex)
     regular = np.abs(poles.real).min(axis=-1) > 1e-12 * np.abs(poles).max(axis=-1)
     if not regular.all():
-        closed, b, poles = (_replaced(v, regular, w) for v, w in ((closed, -np.eye(n)), (b, 0.0), (poles, -1.0)))
-        no_loop = (ratio.numerator, 0.0), (ratio.denominator, np.poly(-np.ones(n)).astype(float))
+        closed, b = _replaced(closed, regular, -np.eye(n)), _replaced(b, regular, 0.0)
+        poles = _replaced(poles, regular, -1.0)
+        no_loop = (ratio.numerator, 0.0), (ratio.denominator, with_roots(-np.ones(n, dtype=complex)))
         ratio = Transfer(*(_replaced(v, regular, w) for v, w in no_loop))
     return ClosedLoop(closed, b, c, ratio, poles, scale, loop.delay * scale, regular)
 

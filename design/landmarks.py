@@ -17,7 +17,7 @@ from design.polynomials import (
     roots,
     with_derivatives,
 )
-from design.transfer import Transfer, markov_parameters, natural_gain, response, transfer_of_poles
+from design.transfer import Response, Transfer, markov_parameters, natural_gain, response, transfer_of_poles
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays
 
 #: A polynomial counts as zero below this part of the terms it is the sum of. At a simple pole on the axis the
@@ -26,8 +26,8 @@ from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays
 VANISHING_ON_AXIS, VANISHING = 1e-9, 1e-13
 #: Poles below this part of the largest are at the origin; the origin is looked at this far below the others.
 AT_ORIGIN, LOW = 1e-7, 1e-5
-#: A gain beyond this many times the reference is that of a loop that rounding alone has closed.
-LARGEST = 1e12
+#: Gains outside these multiples of the reference are 0 or infinite but for rounding.
+RANGE = (1e-10, 1e12)
 #: A crossing is this near to the root of the polynomial that it starts from, in parts of its frequency; the
 #: last of the Newton steps to a breakaway is not longer than this, and all of them together than `NEARBY`.
 SETTLED, NEARBY = 1e-5, 1e-2
@@ -96,19 +96,19 @@ def crossings(landmarks: Landmarks) -> Marks:
     ratio = landmarks.transfer
     omega = real_axis_frequencies(ratio.numerator, ratio.denominator)
     s = np.asarray(1j * omega, dtype=complex)
-    marked = _significant(ratio, s, VANISHING_ON_AXIS)
-    marked[:, 0] = False
+    marked = _significant(ratio, s, VANISHING_ON_AXIS) & (omega > 0.0)
     gain = np.full(s.shape, np.nan)
     gain[:, 0] = _gain_at_origin(landmarks)
     rows = np.nonzero(marked)[0]
     w = omega[marked]
-    at = response(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], s[marked][:, None])
+    at = _response(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], s[marked][:, None])
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.where(at.value.imag == 0.0, 0.0, at.value.imag / at.slope.real)[:, 0]
     close = np.abs(step) <= SETTLED * w
     s[marked] = 1j * np.where(close, w - step, w)
-    at = response(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], s[marked][:, None])
+    at = _response(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], s[marked][:, None])
     gain[marked] = np.where(close, (-1.0 / at.value[:, 0]).real, np.nan)
+    gain = np.where(_in_range(gain, landmarks), gain, np.nan)
     return _sorted(gain, np.asarray(s * landmarks.scale[:, None], dtype=complex))
 
 
@@ -124,7 +124,13 @@ def _gain_at_origin(landmarks: Landmarks) -> FloatArray:
     limit = (np.abs(far - near) < 1e-3 * np.abs(near)) & np.any(landmarks.markov != 0.0, axis=-1)
     inverse = -1.0 / np.where(limit[:, None], L, 1.0).real
     gain = (4.0 * inverse[:, 0] - inverse[:, 1]) / 3.0
-    return np.where(limit & (np.abs(gain) < LARGEST * landmarks.reference), gain, np.nan)
+    return np.where(limit & _in_range(gain[:, None], landmarks)[:, 0], gain, np.nan)
+
+
+def _in_range(gain: FloatArray, landmarks: Landmarks) -> BoolArray:
+    """Mask of the gains (N, M) > 0 that are not 0 or infinite but for rounding."""
+    part = gain / landmarks.reference[:, None]
+    return np.asarray((part > RANGE[0]) & (part < RANGE[1]))
 
 
 def breakaways(landmarks: Landmarks) -> Marks:
@@ -137,19 +143,20 @@ def breakaways(landmarks: Landmarks) -> Marks:
     marked = _significant(ratio, s, VANISHING)
     estimate = -evaluate(ratio.denominator, s) / np.where(marked, evaluate(ratio.numerator, s), 1.0)
     with np.errstate(invalid="ignore"):
-        marked &= (estimate.real > 0.0) & (np.abs(estimate.imag) <= PLAUSIBLE * np.abs(estimate))
+        marked &= _in_range(estimate.real, landmarks) & (np.abs(estimate.imag) <= PLAUSIBLE * estimate.real)
     gain = np.full(s.shape, np.nan)
     rows = np.nonzero(marked)[0]
     start = point = s[marked]
     A, b, c = landmarks.A[rows], landmarks.b[rows], landmarks.c[rows]
     for _ in range(3):
-        at = response(A, b, c, point[:, None])
+        at = _response(A, b, c, point[:, None])
         with np.errstate(divide="ignore", invalid="ignore"):
             step = np.where(at.slope == 0.0, 0.0, at.slope / at.curvature)[:, 0]
         point = np.where(np.abs(step) <= NEARBY * np.abs(point), point - step, point)
     settled = (np.abs(step) <= SETTLED * np.abs(point)) & (np.abs(point - start) <= NEARBY * np.abs(start))
-    k = -1.0 / response(A, b, c, point[:, None]).value[:, 0]
-    s[marked] = point
+    k = -1.0 / _response(A, b, c, point[:, None]).value[:, 0]
+    # A point that is its own mirror image but for rounding is real.
+    s[marked] = np.where(np.abs(point.imag) <= SAME * np.abs(point), point.real, point)
     gain[marked] = np.where(settled & (np.abs(k.imag) <= NEARLY_REAL * np.abs(k)), k.real, np.nan)
     return _sorted(gain, np.asarray(s * landmarks.scale[:, None], dtype=complex))
 
@@ -172,6 +179,14 @@ def asymptotes(landmarks: Landmarks) -> tuple[FloatArray, FloatArray]:
     angle = np.pi * np.where(turn > excess[:, None], turn - 2 * excess[:, None], turn) / excess[:, None]
     angle = np.where(exists[:, None] & (np.arange(n) < excess[:, None]), angle, np.nan)
     return np.where(exists, centroid, np.nan), np.sort(angle, axis=-1)
+
+
+def _response(A: FloatArray, b: FloatArray, c: FloatArray, s: ComplexArray) -> Response:
+    """Response at `s`, or a rounding beside it where a pole that does not move happens to be exactly there."""
+    try:
+        return response(A, b, c, s)
+    except np.linalg.LinAlgError:
+        return response(A, b, c, s * (1.0 + 1e-12))
 
 
 def _significant(ratio: Transfer, s: ComplexArray, least: float) -> BoolArray:

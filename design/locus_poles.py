@@ -11,67 +11,77 @@ from __future__ import annotations
 
 import numpy as np
 
-from design.branches import successors
+from design.branches import continuations, squared_gaps
 from design.poles import pole_order
-from model.arrays import BoolArray, ComplexArray, FloatArray
+from model.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
-#: Every how many gains the eigenvalues themselves are computed.
-STRIDE = 12
+#: Every how many gains the eigenvalues themselves are computed, and again in the segments that this leaves open.
+STRIDES = (16, 4)
 #: Number of iterations; each doubles the number of digits.
 ITERATIONS = 3
-#: Largest last correction over the least distance between two roots; the error left is about its square.
+#: Largest last correction over the distance to the nearest root; the error left is smaller by as much again.
 SEPARATED = 1e-6
 
 
 def poles_along(A: FloatArray, M: FloatArray, gains: FloatArray) -> ComplexArray:
-    """Eigenvalues of ``A - k M`` (N, K, n), each list in `pole_order`.
+    """Eigenvalues of ``A - k M`` (N, K, n).
+
+    Those that come from an eigenvalue problem are in `pole_order`; the others keep the places of those they
+    continue, so that few lists differ in their order from the one before.
 
     Parameters
     ----------
     A, M : (N, n, n), M of rank one
     gains : (N, K), strictly monotonic along the last axis
     """
-    N, K = gains.shape
-    n = A.shape[-1]
-    segments = (K - 1) // STRIDE
-    spanned = segments * STRIDE
-    values = np.empty((N, K, n), dtype=complex)
-    missing = np.ones((N, K), dtype=bool)
-    if segments:
-        missing[:, : spanned + 1 : STRIDE] = False
-        values[:, : spanned + 1 : STRIDE] = _eigenvalues(A[:, None], M[:, None], gains[:, : spanned + 1 : STRIDE])
-        found, certain = _between(values[:, : spanned + 1 : STRIDE], gains[:, : spanned + 1])
-        values[:, :spanned].reshape(N, segments, STRIDE, n)[:, :, 1:] = found
-        missing[:, :spanned].reshape(N, segments, STRIDE)[:, :, 1:] = ~certain
-    rows = np.nonzero(missing)[0]
-    values[missing] = _eigenvalues(A[rows], M[rows], gains[missing])
+    values = np.empty((*gains.shape, A.shape[-1]), dtype=complex)
+    missing = np.ones(gains.shape, dtype=bool)
+
+    def solve(wanted: BoolArray) -> None:
+        rows = np.nonzero(wanted)[0]
+        closed = A[rows] - gains[wanted][:, None, None] * M[rows]
+        values[wanted] = pole_order(np.linalg.eigvals(closed).astype(complex))
+        missing[wanted] = False
+
+    for stride in STRIDES:
+        rows, first = _open_segments(missing, stride)
+        ends = np.zeros_like(missing)
+        ends[rows, first] = ends[rows, first + stride] = True
+        solve(ends & missing)
+        inner = first[:, None] + np.arange(1, stride)
+        k, low, high = gains[rows[:, None], inner], gains[rows, first], gains[rows, first + stride]
+        parts = (k - low[:, None]) / (high - low)[:, None]
+        found, certain = _between(values[rows, first], values[rows, first + stride], parts)
+        where = np.broadcast_to(rows[:, None], inner.shape)[certain], inner[certain]
+        values[where], missing[where] = found[certain], False
+    solve(missing)
     return values
 
 
-def _eigenvalues(A: FloatArray, M: FloatArray, gains: FloatArray) -> ComplexArray:
-    return pole_order(np.linalg.eigvals(A - gains[..., None, None] * M).astype(complex))
+def _open_segments(missing: BoolArray, stride: int) -> tuple[IntArray, IntArray]:
+    """Rows and first places (L,) of the segments of `stride` gains with one inside that is missing (N, K)."""
+    N, K = missing.shape
+    count = (K - 1) // stride
+    inside = missing[:, : count * stride].reshape(N, count, stride)[:, :, 1:].any(axis=-1)
+    rows, segment = np.nonzero(inside)
+    return rows, segment * stride
 
 
-def _between(anchors: ComplexArray, gains: FloatArray) -> tuple[ComplexArray, BoolArray]:
-    """Poles (N, S, STRIDE-1, n) between the gains whose poles (N, S+1, n) are given, and which are certain.
+def _between(start: ComplexArray, end: ComplexArray, parts: FloatArray) -> tuple[ComplexArray, BoolArray]:
+    """Poles (L, m, n) at the `parts` (L, m) of the way from `start` to `end` (L, n), and which (L, m) are sure.
 
     Not even tried are the segments in which a pair leaves or reaches the real axis.
     """
-    follows = successors(anchors)
-    start = anchors[:, :-1]
-    end = np.take_along_axis(anchors[:, 1:], follows, axis=-1)
-    lower, upper = start.imag < 0.0, start.imag > 0.0
+    end = np.take_along_axis(end, continuations(start, end), axis=-1)
     # In pole order the upper one of a pair follows the lower one.
-    partner = np.arange(start.shape[-1]) + lower - upper
+    partner = np.arange(start.shape[-1]) + (start.imag < 0.0) - (start.imag > 0.0)
     alike = np.all(np.take_along_axis(end, partner, axis=-1) == np.conj(end), axis=-1)
-    k = gains[:, :-1].reshape(*start.shape[:2], STRIDE)
-    t = (k[..., 1:] - k[..., :1]) / (gains[:, STRIDE::STRIDE, None] - k[..., :1])
-    values = np.zeros((*t.shape, start.shape[-1]), dtype=complex)
-    certain = np.zeros(t.shape, dtype=bool)
+    values = np.zeros((*parts.shape, start.shape[-1]), dtype=complex)
+    certain = np.zeros(parts.shape, dtype=bool)
     if alike.any():
-        roots, certain[alike] = _simultaneous(start[alike], end[alike], t[alike])
+        roots, certain[alike] = _simultaneous(start[alike], end[alike], parts[alike])
         mirrored = np.conj(np.take_along_axis(roots, partner[alike][:, None, :], axis=-1))
-        values[alike] = pole_order(0.5 * (roots + mirrored))
+        values[alike] = 0.5 * (roots + mirrored)
     return values, certain
 
 
@@ -84,8 +94,8 @@ def _simultaneous(a: ComplexArray, b: ComplexArray, t: FloatArray) -> tuple[Comp
             value = (1.0 - t) * _product(s, a) + t * _product(s, b)
             correction = value / _others(s)
             s = s - correction
-        largest = np.max(correction.real**2 + correction.imag**2, axis=0)
-        certain = largest <= SEPARATED**2 * _nearest(s)
+        squared = correction.real**2 + correction.imag**2
+        certain = np.all(squared <= SEPARATED**2 * squared_gaps(s), axis=0)
     return np.moveaxis(s, 0, -1), certain
 
 
@@ -120,13 +130,3 @@ def _others(s: ComplexArray) -> ComplexArray:
         if (len(s) - 1 - i) % 2:
             np.negative(product[i], out=product[i])
     return product
-
-
-def _nearest(s: ComplexArray) -> FloatArray:
-    """Least ``|s_i - s_j|^2`` of any two, (...) for s (n, ...)."""
-    nearest = np.full(s.shape[1:], np.inf)
-    for i in range(len(s)):
-        for j in range(i):
-            apart = s[i] - s[j]
-            np.minimum(nearest, apart.real**2 + apart.imag**2, out=nearest)
-    return nearest

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from design import landmarks
 from design.loci import root_locus
 from design.loop import SisoLoop
 from design.poles import pole_order
@@ -223,6 +224,24 @@ def test_a_hidden_integral_does_not_hide_the_crossing_at_the_origin():
     assert np.all(np.abs(locus.branches).min(axis=0) < 1e-12)
 
 
+@pytest.mark.parametrize("pole", [-1.0, -3.0, -0.5, 0.0, 2.0, -2.0])
+def test_a_pole_that_does_not_move_changes_nothing(pole):
+    """``1 / (s (s + 2))`` beside a hidden pole, also where that is exactly on the locus or its breakaway."""
+    A = np.array([[0.0, 1.0, 0.0], [0.0, -2.0, 0.0], [1.0, 0.0, pole]])
+    locus = root_locus(SisoLoop("test", A, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.array(1.0), 1))
+    np.testing.assert_allclose(listed(locus.breakaway_gain), [1.0])
+    np.testing.assert_allclose(listed(locus.breakaway_point), [-1.0])
+    assert listed(locus.crossing_gain).size == 0
+    np.testing.assert_allclose(locus.asymptote_centroid, -1.0)
+    assert np.all(np.abs(locus.branches - pole).min(axis=0) < 1e-7)
+
+
+def test_response_beside_a_pole():
+    diagonal, ones = np.diag([0.0, -1.0])[None], np.ones((1, 2))
+    at = landmarks._response(diagonal, ones, ones, np.array([[-1.0 + 0.0j]]))
+    assert abs(at.value[0, 0]) > 1e9
+
+
 @pytest.mark.parametrize("seed", [None, 0, 1, 2])
 def test_open_loop_poles_on_the_axis_are_no_crossings(seed):
     def seen(loop):
@@ -242,6 +261,7 @@ def test_a_triple_point_is_one_point():
     locus = root_locus(of_transfer([1.0, 1.0], [1.0, 9.0, 0.0, 0.0], gain=20.0))
     np.testing.assert_allclose(listed(locus.breakaway_gain), [27.0], rtol=1e-9)
     np.testing.assert_allclose(listed(locus.breakaway_point), [-3.0], rtol=1e-6)
+    assert listed(locus.breakaway_point).imag == 0.0
 
 
 def test_complex_breakaways_come_in_pairs():

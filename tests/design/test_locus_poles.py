@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from design import locus_poles
+from design.branches import successors
 from design.locus_poles import poles_along
 from design.poles import pole_order
 from tests.design.siso_loops import stabilised
@@ -46,14 +47,17 @@ def test_most_poles_come_without_an_eigenvalue_problem(monkeypatch):
     gains = np.concatenate([[0.0], np.geomspace(1e-2, 1e2, 299)]) * np.ones((20, 1))
     monkeypatch.setattr(locus_poles.np.linalg, "eigvals", counted)
     poles_along(A, M, gains)
-    assert sum(solved) < 0.35 * gains.size
+    assert sum(solved) < 0.25 * gains.size
 
 
-def test_lists_are_in_order_with_exact_pairs():
+def test_lists_keep_their_places_and_pairs_are_exact():
     A, M = rank_one(15, 6, seed=4)
     gains = np.geomspace(1e-2, 1e2, 200) * np.ones((15, 1))
     found = poles_along(A, M, gains)
-    np.testing.assert_array_equal(found, pole_order(found))
+    anchors = found[:, :: locus_poles.STRIDES[0]]
+    np.testing.assert_array_equal(anchors, pole_order(anchors))
+    in_place = np.all(successors(found) == np.arange(6), axis=-1)
+    assert in_place.mean() > 0.9
     assert np.all(np.isin(np.conj(found[found.imag != 0.0]), found))
 
 
@@ -65,14 +69,15 @@ def test_poles_that_all_but_touch_are_not_mixed_up():
         gains = np.linspace(0.0, 4.0, 61)[None]
         found = poles_along(A[None], M[None], gains)
         expected = eigenvalues(A[None], M[None], gains)
-        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(pole_order(found), expected, rtol=0.0, atol=1e-9)
 
 
 def test_falling_gains_and_grid_equal_points():
     A, M = rank_one(5, 4, seed=2)
     gains = np.geomspace(1e-2, 1e2, 150) * np.linspace(1.0, 2.0, 5)[:, None]
     found = poles_along(A, M, gains)
-    np.testing.assert_allclose(poles_along(A, M, gains[:, ::-1]), found[:, ::-1], rtol=0.0, atol=1e-6)
+    falling = poles_along(A, M, gains[:, ::-1])[:, ::-1]
+    np.testing.assert_allclose(np.sort_complex(falling), np.sort_complex(found), rtol=0.0, atol=1e-6)
     for i in range(5):
         one = poles_along(A[i : i + 1], M[i : i + 1], gains[i : i + 1])[0]
         np.testing.assert_allclose(found[i], one, rtol=0.0, atol=1e-10)
