@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.demand import ActuatorDemand, actuator_demands
+from design.frequency.margins import Margins, margins
+from design.frequency.poles import least_damping_ratio, poles
 from design.loop import Loop
-from design.margins import Margins, margins
-from design.poles import least_damping_ratio, poles
-from design.response import step_response
+from design.response.demand import ActuatorDemand, actuator_demands
+from design.response.step_metrics import StepMetrics, step_metrics
+from design.response.step_response import step_response
 from design.specs import SPEC_PACKS, Spec, Verdict
-from design.step_metrics import StepMetrics, step_metrics
 from model.actuators import Actuator
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays
 

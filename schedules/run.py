@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.assess import Assessment, achieved, assess, verdicts
-from design.classical import ClassicalController, design_classical, gain_values
-from design.concurrent import lqr_loop
+from design.classical.synthesis import ClassicalController, design_classical, gain_values
+from design.classical.tab_loop import tab_loop
+from design.frequency.poles import largest_real_part
 from design.gains import Gain
 from design.loop import Loop
-from design.lqr import LqrController, LqrDesign, design_lqr
+from design.lqr.synthesis import LqrController, LqrDesign, design_lqr
+from design.lqr.torque_loop import lqr_loop
+from design.lqr.weights import WeightsRefused
 from design.outcome import Outcome, Outcomes
-from design.poles import largest_real_part
 from design.specs import Spec, Verdict
-from design.tab_loop import tab_loop
-from design.weights import WeightsRefused
 from model.arrays import FloatArray
 from schedules.analysis import EnvelopeWarning, PlantEnvelope, analyse
 from schedules.study import Controller, Study

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from design.classical import LAWS, ClassicalController
+from design.classical.synthesis import LAWS, ClassicalController
 from schedules.run import DesignedController, DesignedEnvelope
 from schedules.schedule import GainSchedule, Provenance
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from design.classical import ClassicalController
-from design.lqr import LqrController
+from design.classical.synthesis import ClassicalController
+from design.lqr.synthesis import LqrController
 from model.actuators import Actuator
 from model.aerodynamics import Aerodynamics
 from model.flight import SpeedAxis

@@ -11,8 +11,8 @@ from typing import TypeVar
 import numpy as np
 import orjson
 
-from design.lqr import LqrController
-from design.weights import ExplicitWeights
+from design.lqr.synthesis import LqrController
+from design.lqr.weights import ExplicitWeights
 from model.arrays import FloatArray
 from schedules.analysis import PlantEnvelope, analyse
 from schedules.run import ControllerRefused, DesignedController, DesignedEnvelope, run

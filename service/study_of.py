@@ -6,10 +6,10 @@ from math import radians, tau
 
 import numpy as np
 
-from design.classical import ClassicalController
-from design.lqr import LqrController
+from design.classical.synthesis import ClassicalController
+from design.lqr.synthesis import LqrController
+from design.lqr.weights import BrysonWeights, ExplicitWeights
 from design.specs import Spec
-from design.weights import BrysonWeights, ExplicitWeights
 from model.actuators import Actuator, ActuatorLimits
 from model.aerodynamics import Aerodynamics
 from model.flight import SpeedAxis

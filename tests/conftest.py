@@ -53,10 +53,10 @@ def tab_actuator():
 @pytest.fixture(scope="session")
 def wind_tunnel_study():
     """The example wind_tunnel as a study: nf, pf and lqr over the grid of 2 x 4."""
-    from design.classical import ClassicalController
-    from design.lqr import LqrController
+    from design.classical.synthesis import ClassicalController
+    from design.lqr.synthesis import LqrController
+    from design.lqr.weights import BrysonWeights
     from design.specs import Spec
-    from design.weights import BrysonWeights
     from model.actuators import Actuator, ActuatorLimits
     from model.examples import WIND_TUNNEL_TRIM, wind_tunnel
     from schedules.study import GridRequest, Reference, Study

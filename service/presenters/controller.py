@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from design.margins import Margins
+from design.frequency.margins import Margins
+from design.response.step_metrics import StepMetrics
 from design.specs import Verdict
-from design.step_metrics import StepMetrics
 from schedules.run import DesignedController
 from service.presenters.riccati import riccati_document
 from service.spec_names import spec_field

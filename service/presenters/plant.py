@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from design.poles import poles
+from design.frequency.poles import poles
 from model.hinge_moments.expansion import HingeMoments
 from model.linear_model import LinearModel
 from model.servo_tab import ServoTab

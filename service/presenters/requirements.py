@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from design.demand import ActuatorDemand
+from design.response.demand import ActuatorDemand
 from model.actuators import Actuator
 from model.arrays import FloatArray
 from schedules.run import DesignedController, DesignedEnvelope

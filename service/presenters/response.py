@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from design.response import Response
+from design.response.step_response import Response
 from schedules.wire_names import wire_name
 
 #: Output of a loop -> its unit inside; angles are turned to degrees.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from design.lqr import LqrDesign
+from design.lqr.synthesis import LqrDesign
 
 
 def riccati_document(design: LqrDesign, index: tuple[int, ...]) -> dict[str, Any]:

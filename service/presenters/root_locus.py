@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from design.loci import RootLocus
+from design.frequency.loci import RootLocus
 
 
 def root_locus_document(locus: RootLocus) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from design.response import step_response
+from design.response.step_response import step_response
 from schedules.interpolate import interpolate
 from schedules.run import DesignedEnvelope
 from schedules.schedule_of import schedule_of

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from design.loci import root_locus
+from design.frequency.loci import root_locus
 from design.loop import Loop, SisoLoop
 from service.answering import answer, encode
 from service.designs import controller_of, point_with_gains

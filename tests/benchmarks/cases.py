@@ -7,11 +7,11 @@ from functools import cache
 
 import numpy as np
 
-from design.concurrent import lqr_loop
 from design.loop import Loop
-from design.lqr import LqrController, design_lqr
-from design.tracking import TrackingPlant, augment_with_integral
-from design.weights import BrysonWeights, ExplicitWeights, weight_matrices
+from design.lqr.synthesis import LqrController, design_lqr
+from design.lqr.torque_loop import lqr_loop
+from design.lqr.tracking import TrackingPlant, augment_with_integral
+from design.lqr.weights import BrysonWeights, ExplicitWeights, weight_matrices
 from model.actuators import Actuator
 from model.examples import WIND_TUNNEL_TRIM, wind_tunnel
 from schedules.analysis import PlantEnvelope, analyse

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.linalg import solve, solve_continuous_are
 
 from design.loop import Loop
-from design.tracking import TrackingPlant
-from design.weights import ExplicitWeights
+from design.lqr.tracking import TrackingPlant
+from design.lqr.weights import ExplicitWeights
 from model.arrays import FloatArray
 from model.flight import FlightCondition
 from model.motion import acceleration

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import orjson
 
-from design.loci import root_locus
-from design.lqr import design_lqr
-from design.margins import margins
-from design.response import step_response
-from design.riccati import solve_riccati
+from design.frequency.loci import root_locus
+from design.frequency.margins import margins
+from design.lqr.riccati import solve_riccati
+from design.lqr.synthesis import design_lqr
+from design.response.step_response import step_response
 from model.linearise import linearise
 from schedules.run import run
 from tests.benchmarks import peers
@@ -50,7 +50,7 @@ def _linearise_lqr(c: Case) -> Row:
         return design_lqr(model, controller).K.reshape(25, 2, 5)
 
     return Row(
-        "linearise + LQR with certificate", "ct.linearize + ct.lqr", 40.0, ours,
+        "linearise + LQR with certificate", "ct.linearize + ct.lqr", 12.0, ours,
         lambda: peers.control_linearise_lqr(c.plant, c.weights), _close(1e-4),
     )  # fmt: skip
 

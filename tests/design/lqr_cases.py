@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.lqr import LqrController
-from design.weights import BrysonWeights
+from design.lqr.synthesis import LqrController
+from design.lqr.weights import BrysonWeights
 from model.arrays import FloatArray
 from model.examples import (
     AIRLINER_TRIM,

@@ -8,7 +8,7 @@
 import numpy as np
 import pytest
 
-from design.loci import root_locus
+from design.frequency.loci import root_locus
 from tests.design.siso_loops import of_transfer
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from design.riccati import solve_riccati
+from design.lqr.riccati import solve_riccati
 
 # Every matrix below is A, B, Q, R; expected numbers to half a unit of their last printed digit.
 

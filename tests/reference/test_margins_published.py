@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
+from design.frequency.margins import margins
 from design.loop import Loop, SisoLoop
-from design.margins import margins
 from tests.design.siso_loops import of_transfer
 
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from design.classical import ClassicalController
+from design.classical.synthesis import ClassicalController
 from design.gains import Gain
+from design.lqr.weights import ExplicitWeights
 from design.outcome import Outcome
 from design.specs import Spec
-from design.weights import ExplicitWeights
 from schedules.run import ControllerRefused, run
 from schedules.study import GridRequest
 

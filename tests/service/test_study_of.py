@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from design.classical import ClassicalController
-from design.gain_search import STEERABLE
-from design.lqr import LqrController
+from design.classical.gain_search import STEERABLE
+from design.classical.synthesis import ClassicalController
+from design.lqr.synthesis import LqrController
+from design.lqr.weights import BrysonWeights, ExplicitWeights, weight_matrices
 from design.specs import QUANTITIES, Spec
-from design.weights import BrysonWeights, ExplicitWeights, weight_matrices
 from model import examples as sections
 from model.actuators import ActuatorLimits
 from model.system import TabAileron

@@ -1,0 +1,1 @@
+"""Concurrent actuation by LQR: weights, Riccati equations with certificates, tracking, and the loop that is flown."""
