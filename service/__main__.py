@@ -26,6 +26,7 @@ def main() -> None:
     import uvicorn
     from pydantic import ValidationError
 
+    from model.memory import keep_freed_memory
     from service.app import create_app
     from service.settings import Settings
 
@@ -34,6 +35,7 @@ def main() -> None:
     except ValidationError as error:
         wrong = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
         raise SystemExit(f"settings: {wrong}") from None
+    keep_freed_memory()
     uvicorn.run(create_app(settings), host=settings.host, port=settings.port, server_header=False)
 
 

@@ -15,6 +15,7 @@ import warnings  # noqa: E402
 from importlib.metadata import version  # noqa: E402
 from importlib.util import find_spec  # noqa: E402
 
+from model.memory import keep_freed_memory  # noqa: E402
 from tests.benchmarks.measure import measure  # noqa: E402
 from tests.benchmarks.rows import rows  # noqa: E402
 
@@ -26,6 +27,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="rows whose name contains this")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
+    keep_freed_memory()  # as the service does; it helps both sides
     versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "control"))
     slycot = "with slycot" if find_spec("slycot") else "without slycot"
     print(

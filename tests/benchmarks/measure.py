@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+#: Shortest timing [s]; both sides are called as often as it takes to fill it.
+SHORTEST = 0.05
+
 
 @dataclass(frozen=True)
 class Row:
@@ -54,14 +57,22 @@ class Measured:
 def measure(row: Row, repeats: int) -> Measured:
     """Check that both sides agree, then time them in turn `repeats` times."""
     row.agree(row.ours(), row.theirs())
+    calls_of_ours, calls_of_theirs = _calls(row.ours), _calls(row.theirs)
     ours, theirs = [], []
     for _ in range(repeats):
-        ours.append(_seconds(row.ours))
-        theirs.append(_seconds(row.theirs))
+        ours.append(_seconds(row.ours, calls_of_ours))
+        theirs.append(_seconds(row.theirs, calls_of_theirs))
     return Measured(row, ours, theirs)
 
 
-def _seconds(work: Callable[[], Any]) -> float:
+def _calls(work: Callable[[], Any]) -> int:
+    """How many calls make one timing: enough for `SHORTEST`, so that a short job is not timed cold."""
+    return max(1, int(SHORTEST / _seconds(work, 1)))
+
+
+def _seconds(work: Callable[[], Any], calls: int) -> float:
+    """Mean wall time [s] of a call."""
     start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
+    for _ in range(calls):
+        work()
+    return (time.perf_counter() - start) / calls
