@@ -73,7 +73,6 @@ def _enter_branch(place: Place, here: Any) -> None:
 
 
 @pytest.mark.parametrize("controllers", [slice(1, 2), slice(2, 3)], ids=["pf", "lqr"])
-@pytest.mark.filterwarnings("default")
 def test_the_edges_of_every_range(client: TestClient, controllers: slice) -> None:
     document, tried = one_point(controllers), 0
     for pointer, value in edges(client, document):

@@ -153,3 +153,13 @@ def test_hinge_moments_are_the_moments_of_the_pressure(client: TestClient) -> No
 def test_bad_hinge_moments(client: TestClient, refused: Any, change: Any, pointer: str) -> None:
     (error,) = refused(client.post("/v1/hinge-moments", json=HINGES | change), 422)["errors"]
     assert error["pointer"] == pointer
+
+
+def test_every_setting_is_in_the_readme() -> None:
+    from pathlib import Path
+
+    from service.settings import Settings
+
+    page = (Path(__file__).parents[2] / "service" / "README.md").read_text()
+    missing = [name for name in Settings.model_fields if f"`{name.upper()}`" not in page]
+    assert missing == []
