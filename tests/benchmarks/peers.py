@@ -18,12 +18,30 @@ from design.lqr.weights import ExplicitWeights
 from model.arrays import FloatArray
 from model.flight import FlightCondition
 from model.motion import acceleration
+from model.system import TabAileron
 from model.trim import Trim
 from schedules.analysis import PlantEnvelope
 from tests.benchmarks.cases import DURATION, GAINS, SAMPLES, STEP
 
 #: Where `ct.disk_margins` looks [rad/s].
 FREQUENCIES = np.geomspace(0.1, 1e4, 400)
+
+
+def numpy_linear_models(system: TabAileron, condition: FlightCondition) -> FloatArray:
+    """State matrices point by point, as a script does it: thesis damping about neutral surfaces, in numpy."""
+    g, gradient = system.geometry, system.aerodynamics.source.at(0.0, 0.0, 0.0).gradient
+    J, G = system.inertia_matrix, gradient[:, 1:]
+    ca, ct = g.aileron_chord, g.tab_chord
+    matrices = []
+    for V, q in zip(condition.airspeed, condition.dynamic_pressure, strict=True):
+        load = q * g.chord**2 * g.span
+        rates = np.array([[ct / 4, ca], [0.0, ca / 4]]) / V  # induced angles of tab and aileron by dt', da'
+        K, D = -load * G, -load * G @ rates
+        A = np.zeros((4, 4))
+        A[0, 1] = A[2, 3] = 1.0
+        A[np.ix_([1, 3], [0, 2])], A[np.ix_([1, 3], [1, 3])] = np.linalg.solve(J, K), np.linalg.solve(J, D)
+        matrices.append(A)
+    return np.array(matrices)
 
 
 def scipy_lqr(plant: TrackingPlant, weights: ExplicitWeights) -> FloatArray:

@@ -13,7 +13,10 @@ from design.frequency.margins import margins
 from design.lqr.riccati import solve_riccati
 from design.lqr.synthesis import design_lqr
 from design.response.step_response import step_response
+from model.examples import wind_tunnel
+from model.flight import flight_condition
 from model.linearise import linearise
+from model.trim import TrimRequest, trim
 from schedules.run import run
 from tests.benchmarks import peers
 from tests.benchmarks.cases import DURATION, GAINS, SAMPLES, STEP, Case, case
@@ -40,6 +43,18 @@ def _close(rtol: float) -> Any:
         np.testing.assert_allclose(ours, theirs, rtol=rtol, atol=rtol * np.max(np.abs(theirs)))
 
     return agree
+
+
+def _linear_models() -> Row:
+    system, count = wind_tunnel(), 1000
+    condition = flight_condition(
+        np.linspace(0.0, 9000.0, count), "dynamic_pressure", np.geomspace(200.0, 2000.0, count)
+    )
+    neutral = trim(system, condition, TrimRequest(alpha=0.0))
+    return Row(
+        "linear models of 1000 points", "numpy loop", 20.0, lambda: linearise(system, condition, neutral).A,
+        lambda: peers.numpy_linear_models(system, condition), _close(1e-12),
+    )  # fmt: skip
 
 
 def _linearise_lqr(c: Case) -> Row:
