@@ -27,6 +27,7 @@ def rows() -> list[Row]:
     """All rows, in the order they are printed."""
     c = case()
     return [
+        _linear_models(),
         _linearise_lqr(c),
         _lqr_scipy(c),
         _lqr_control(c),
