@@ -11,7 +11,7 @@ from model.arrays import BoolArray, FloatArray, Floats
 from model.hinge_moments.compressibility import is_subsonic, prandtl_glauert
 from model.hinge_moments.expansion import HingeMoments, HingeMomentSource
 
-Damping = Literal["thesis", "quasi_steady"]
+Damping = Literal["thesis", "quasi_steady", "unsteady"]
 Compressibility = Literal["none", "prandtl_glauert"]
 
 
@@ -23,7 +23,9 @@ class Aerodynamics:
     ----------
     source : steady hinge moments at given angles
     damping : ``thesis``: induced angles of seed 2.2.12 and 2.2.13, verbatim; ``quasi_steady``: the rate
-        derivatives of thin-aerofoil theory with C(k) = 1
+        derivatives of thin-aerofoil theory with C(k) = 1; ``unsteady``: those, with the circulation behind by
+        Jones's approximation of Theodorsen's function, two more states (`lag_states`). All but the steady part is
+        thin-aerofoil theory for the section's hinges, whatever the source
     virtual_inertia : add the air's apparent inertia, from thin-aerofoil theory
     compressibility : ``prandtl_glauert`` multiplies the steady coefficients and the rate derivatives by
         ``1/sqrt(1 - M^2)`` (on the rates a first-order guess), not the virtual inertia

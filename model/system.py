@@ -10,8 +10,14 @@ import numpy as np
 from model.aerodynamics import Aerodynamics
 from model.arrays import FloatArray
 from model.flight import FlightCondition
-from model.hinge_moments.closed_forms import acceleration_moment, between_surfaces, rate_moment
+from model.hinge_moments.closed_forms import (
+    acceleration_moment,
+    between_surfaces,
+    incidence_moment,
+    rate_moment,
+)
 from model.hinge_moments.thin_aerofoil import ThinAerofoil
+from model.hinge_moments.unsteady import circulatory_angle, circulatory_rate
 from model.section import Geometry, Inertia, inertia_matrix
 
 
@@ -50,6 +56,26 @@ class TabAileron:
     def acceleration_derivatives(self) -> FloatArray:
         """Virtual inertia ``dC_H / d(c^2 d''/V^2)`` (*H, 2, 2), symmetric, order [tab, aileron] [-]."""
         return between_surfaces(acceleration_moment, self.geometry.aileron_hinge, self.geometry.tab_hinge)
+
+    @cached_property
+    def incidence_derivatives(self) -> FloatArray:
+        """Load moment at each hinge per radian of incidence, ``G_alpha`` (*H, 2), order [tab, aileron] [1/rad]."""
+        return incidence_moment(self._hinges)
+
+    @cached_property
+    def circulatory_angles(self) -> FloatArray:
+        """Incidence that a radian of each surface is worth to the circulation (*H, 2), order [tab, aileron] [-]."""
+        return circulatory_angle(self._hinges)
+
+    @cached_property
+    def circulatory_rates(self) -> FloatArray:
+        """The same of a unit of ``c d'/V`` (*H, 2), order [tab, aileron] [-]."""
+        return circulatory_rate(self._hinges)
+
+    @property
+    def _hinges(self) -> FloatArray:
+        hinges = (np.asarray(x, float) for x in (self.geometry.tab_hinge, self.geometry.aileron_hinge))
+        return np.stack(np.broadcast_arrays(*hinges), axis=-1)
 
     def hinge_load(self, condition: FlightCondition) -> FloatArray:
         """Torque of a unit hinge-moment coefficient, ``q c^2 s`` (*G,) [N m]; seed 2.2.4 times the span."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from design.frequency.fastest_mode import fastest_surface_mode
 from design.outcome import Outcome, Outcomes
 from model.aerodynamics import Aerodynamics
-from model.arrays import BoolArray
+from model.arrays import BoolArray, FloatArray
 from model.flight import FlightCondition, FlightGrid, flight_grid
-from model.hinge_moments.expansion import HingeMoments
+from model.hinge_moments.expansion import HingeMoments, HingeMomentSource
 from model.linear_model import LinearModel
 from model.linearise import linearise
+from model.reduced_frequency import reduced_frequency
 from model.servo_tab import ServoTab, servo_tab
 from model.system import TabAileron
 from model.trim import Trim, trim
@@ -51,6 +54,16 @@ class PlantEnvelope:
     servo_tab: ServoTab
     warnings: tuple[EnvelopeWarning, ...]
 
+    @cached_property
+    def reduced_frequency(self) -> FloatArray:
+        """Reduced frequency k of the fastest mode of both surfaces without control (*G,) [-]; nan outside the model."""
+        A = self.model.A
+        finite = np.isfinite(A).all(axis=(-2, -1))
+        fastest = np.full(finite.shape, complex(np.nan, np.nan))
+        fastest[finite] = fastest_surface_mode(A[finite], self.model.states, ("dt", "da"))
+        condition, chord = self.grid.condition, self.system.geometry.chord
+        return reduced_frequency(fastest[..., None], condition, chord)[..., 0]
+
 
 def analyse(study: PlantStudy) -> PlantEnvelope:
     """Linearise the section over the whole grid.
@@ -70,16 +83,18 @@ def analyse(study: PlantStudy) -> PlantEnvelope:
     found = trim(system, condition, study.trim)
     trimmed = found.spread(covered)
     outcomes = outcomes.failing(
-        covered & ~trimmed.reached,
-        Outcome.OUTSIDE_MODEL,
-        lambda index: f"no tab angle trims the aileron; {trimmed.residual[index]:.4g} N m are left out of balance",
+        covered & ~trimmed.reached, Outcome.OUTSIDE_MODEL, lambda index: str(trimmed.reason[index])
     )
+    outcomes = _outside_data(outcomes, covered, found, study.aerodynamics.source)
+    # Only points inside the model have a linear model; an extrapolated one would be taken for real.
+    ok = outcomes.ok
+    condition, found = grid.condition.take(ok), trimmed.take(ok)
     angles = found.state[..., 0], found.state[..., 2]
     moments = study.aerodynamics.hinge_moments(found.alpha, *angles, condition.mach)
     model = linearise(system, condition, found)
     return PlantEnvelope(
-        grid, system, outcomes, trimmed, moments.spread(covered), model.spread(covered),
-        servo_tab(model).spread(covered), _mach_warnings(study.aerodynamics, grid.condition, outcomes.ok),
+        grid, system, outcomes, trimmed, moments.spread(ok), model.spread(ok),
+        servo_tab(model).spread(ok), _mach_warnings(study.aerodynamics, grid.condition, ok),
     )  # fmt: skip
 
 
@@ -90,6 +105,22 @@ def _outside(grid: FlightGrid, covered: BoolArray) -> Outcomes:
         Outcome.OUTSIDE_MODEL,
         lambda index: f"Mach {mach[index]:.4g} is outside the subsonic model (Mach < 1)",
     )
+
+
+def _outside_data(outcomes: Outcomes, covered: BoolArray, found: Trim, source: HingeMomentSource) -> Outcomes:
+    """Mark the trims (those of `covered`) whose angles the hinge-moment source knows nothing about."""
+    known = np.ones(covered.shape, dtype=bool)
+    known[covered] = source.covers(found.alpha, found.state[..., 0], found.state[..., 2])
+    trimmed = found.spread(covered)
+
+    def reason(index: tuple[int, ...]) -> str:
+        alpha, dt, da = np.rad2deg([trimmed.alpha[index], trimmed.state[index][0], trimmed.state[index][2]])
+        return (
+            f"the trim at alpha {alpha:.4g}, tab {dt:.4g}, aileron {da:.4g} deg lies outside the hinge-moment data: "
+            f"{source.domain}"
+        )
+
+    return outcomes.failing(~known, Outcome.OUTSIDE_MODEL, reason)
 
 
 def _mach_warnings(

@@ -9,6 +9,7 @@ import numpy as np
 from design.assess import Assessment, achieved, assess, verdicts
 from design.classical.synthesis import ClassicalController, design_classical, gain_values
 from design.classical.tab_loop import tab_loop
+from design.frequency.fastest_mode import fastest_surface_mode
 from design.frequency.poles import largest_real_part
 from design.gains import Gain
 from design.loop import Loop
@@ -17,7 +18,8 @@ from design.lqr.torque_loop import lqr_loop
 from design.lqr.weights import WeightsRefused
 from design.outcome import Outcome, Outcomes
 from design.specs import Spec, Verdict
-from model.arrays import FloatArray
+from model.arrays import BoolArray, ComplexArray, FloatArray
+from model.reduced_frequency import QUASI_STEADY_LIMIT, reduced_frequency
 from schedules.analysis import EnvelopeWarning, PlantEnvelope, analyse
 from schedules.study import Controller, Study
 
@@ -33,6 +35,10 @@ class DesignedController:
     gains : each (*G,), nan where the outcome is not ok
     loop : over the whole grid, nan where the outcome is not ok
     assessment : over the whole grid, nan where the outcome is not ok; None when no point is
+    fastest_mode : (*G,) fastest closed-loop mode of the surfaces that the air moves (`design.frequency.fastest_mode`)
+        [rad/s]: both of them with state feedback, the aileron where the tab's position is imposed; nan where the
+        outcome is not ok
+    reduced_frequency : (*G,) k of that mode [-]
     verdicts : one per spec
     riccati : solution and certificate of the LQR; None for classical controllers
     """
@@ -42,6 +48,8 @@ class DesignedController:
     gains: tuple[Gain, ...]
     loop: Loop
     assessment: Assessment | None
+    fastest_mode: ComplexArray
+    reduced_frequency: FloatArray
     verdicts: tuple[Verdict, ...]
     riccati: LqrDesign | None
 
@@ -88,7 +96,8 @@ def run(study: Study) -> DesignedEnvelope:
     """
     plant = analyse(study)
     controllers = tuple(_design(study, plant, request) for request in study.controllers)
-    return DesignedEnvelope(study, plant, controllers, plant.warnings + _trim_warnings(study, plant))
+    warnings = plant.warnings + _trim_warnings(study, plant) + _frequency_warnings(study, controllers)
+    return DesignedEnvelope(study, plant, controllers, warnings)
 
 
 def horizon(study: Study, request: Controller) -> float:
@@ -112,7 +121,7 @@ def _classical(study: Study, plant: PlantEnvelope, request: ClassicalController)
         plant.servo_tab, study.tab_actuator, request, horizon(study, request), plant.outcomes
     )
     loop = tab_loop(plant.model, plant.servo_tab, study.tab_actuator, request, gain_values(gains))
-    return _judged(study, request, outcomes, gains, loop, None)
+    return _judged(study, plant, request, outcomes, gains, loop, None)
 
 
 def _lqr(study: Study, plant: PlantEnvelope, request: LqrController) -> DesignedController:
@@ -121,11 +130,12 @@ def _lqr(study: Study, plant: PlantEnvelope, request: LqrController) -> Designed
     except WeightsRefused as refused:
         raise ControllerRefused(request.name, refused) from refused
     loop = lqr_loop(plant.model, design)
-    return _judged(study, request, design.outcomes, _matrix_gains(loop, plant.model.inputs), loop, design)
+    return _judged(study, plant, request, design.outcomes, _matrix_gains(loop, plant.model.inputs), loop, design)
 
 
 def _judged(
     study: Study,
+    plant: PlantEnvelope,
     request: Controller,
     outcomes: Outcomes,
     gains: tuple[Gain, ...],
@@ -134,8 +144,10 @@ def _judged(
 ) -> DesignedController:
     """Judge the loop as it is flown, and withdraw every gain that this second look does not bear out."""
     ok = outcomes.ok
+    fastest = _fastest_mode(request, loop, ok)
+    frequency = reduced_frequency(fastest[..., None], plant.grid.condition, study.geometry.chord)[..., 0]
     if not np.any(ok):
-        return DesignedController(request, outcomes, gains, loop, None, (), riccati)
+        return DesignedController(request, outcomes, gains, loop, None, fastest, frequency, (), riccati)
     step, duration = np.array([study.reference.aileron]), horizon(study, request)
     try:
         found = assess(loop.take(ok), step, duration).spread(ok)
@@ -144,10 +156,19 @@ def _judged(
         checked = _without_unjudgeable(outcomes, loop, step, duration)
     if not np.array_equal(checked.ok, ok):
         kept = loop.take(checked.ok).spread(checked.ok)
-        return _judged(study, request, checked, _kept(gains, checked), kept, riccati)
+        return _judged(study, plant, request, checked, _kept(gains, checked), kept, riccati)
     actuators = {"tab": study.tab_actuator, "aileron": study.aileron_actuator}
     said = verdicts(found, ok, _asked(request), study.spec_pack, actuators)
-    return DesignedController(request, outcomes, gains, loop, found, said, riccati)
+    return DesignedController(request, outcomes, gains, loop, found, fastest, frequency, said, riccati)
+
+
+def _fastest_mode(request: Controller, loop: Loop, ok: BoolArray) -> ComplexArray:
+    """Fastest closed-loop mode of the surfaces that the air moves (*G,) [rad/s], nan where there is no design."""
+    fastest = np.full(ok.shape, complex(np.nan, np.nan))
+    surfaces = ("da",) if isinstance(request, ClassicalController) else ("dt", "da")
+    if np.any(ok):
+        fastest[ok] = fastest_surface_mode(loop.closed[ok], loop.states, surfaces)
+    return fastest
 
 
 def _without_unjudgeable(outcomes: Outcomes, loop: Loop, step: FloatArray, duration: float) -> Outcomes:
@@ -200,6 +221,8 @@ _TORQUE_GAIN_UNITS = {
     "dt_rate": "N m s/rad",
     "da_rate": "N m s/rad",
     "int_a": "N m/(rad s)",
+    "lag_1": "N m/rad",
+    "lag_2": "N m/rad",
 }
 
 
@@ -230,3 +253,20 @@ def _trim_warnings(study: Study, plant: PlantEnvelope) -> tuple[EnvelopeWarning,
         f"({', '.join(names)}) have no actuator for; trim the tab with 'zero_aileron_torque' for a floating aileron"
     )
     return (EnvelopeWarning("aileron_torque_at_trim", detail, tuple(int(i) for i in np.flatnonzero(held))),)
+
+
+def _frequency_warnings(study: Study, controllers: tuple[DesignedController, ...]) -> tuple[EnvelopeWarning, ...]:
+    """Points at which a closed loop is too fast for a circulation that is taken as settled."""
+    damping = study.aerodynamics.damping
+    if damping == "unsteady" or not controllers:
+        return ()
+    largest = np.max(np.stack([np.nan_to_num(c.reduced_frequency, nan=0.0) for c in controllers]), axis=(1, 2))
+    fast = np.any([c.reduced_frequency > QUASI_STEADY_LIMIT for c in controllers], axis=0)
+    if not np.any(fast):
+        return ()
+    each = ", ".join(f"{c.request.name} {k:.3g}" for c, k in zip(controllers, largest, strict=True))
+    detail = (
+        f"reduced frequency k of the fastest closed-loop mode of the surfaces up to: {each}; damping '{damping}' takes "
+        f"the circulation as settled, which holds below k = {QUASI_STEADY_LIMIT}; damping 'unsteady' has its lag"
+    )
+    return (EnvelopeWarning("reduced_frequency", detail, tuple(int(i) for i in np.flatnonzero(fast))),)

@@ -9,8 +9,9 @@ import numpy as np
 from model.flight import flight_grid
 from schedules.study import PlantStudy
 from service.refusals import FieldRefusal, InvalidRequest, LimitExceeded
-from service.schemas import flight
-from service.schemas.requests import DesignRequest
+from service.schemas import aerodynamics, flight
+from service.schemas.requests import DesignRequest, LinearModelsRequest
+from service.schemas.studies import EigenvalueSweepRequest, SteadyStateMapRequest
 from service.settings import Settings
 
 #: Limits of a server, in the order in which they are listed, with the unit of each.
@@ -22,6 +23,9 @@ LIMITS = {
     "max_tab_only_designs": "1",
     "max_locus_gains": "1",
     "max_response_samples": "1",
+    "max_table_rows": "1",
+    "max_map_cells": "1",
+    "max_sweep_models": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
 }
@@ -71,14 +75,66 @@ def check_grid(grid: flight.Grid, settings: Settings) -> int:
     return points
 
 
-def check_design(request: DesignRequest, settings: Settings) -> None:
-    """Refuse a design of too many points or controllers.
+def check_table(wire: aerodynamics.Aerodynamics, settings: Settings, fits: int = 1) -> None:
+    """Refuse a table of too many rows, before any of them is read, or too many fits of it.
 
     Raises
     ------
     LimitExceeded
     """
-    points, controllers = check_grid(request.grid, settings), len(request.controllers)
+    if not isinstance(wire, aerodynamics.Table):
+        return
+    by_csv = wire.csv is not None
+    rows = len(str(wire.csv).splitlines()) if by_csv else len(wire.rows or ())
+    pointer, what = f"/aerodynamics/{'csv' if by_csv else 'rows'}", "lines" if by_csv else "rows"
+    check_size(pointer, what, rows, "max_table_rows", settings)
+    check_size("/vary/values", f"{what} times values", rows * fits, "max_table_rows", settings)
+
+
+def check_plant(request: LinearModelsRequest, settings: Settings) -> int:
+    """Refuse the plant of too many grid points or table rows; how many points there are.
+
+    Raises
+    ------
+    LimitExceeded
+    """
+    check_table(request.aerodynamics, settings)
+    return check_grid(request.grid, settings)
+
+
+def check_map(request: SteadyStateMapRequest, settings: Settings) -> None:
+    """Refuse a steady-state map of too many cells.
+
+    Raises
+    ------
+    LimitExceeded
+    """
+    plane = request.deflections
+    cells = check_plant(request, settings) * _length(plane.aileron_deg) * _length(plane.tab_deg)
+    check_size("/deflections", "grid points times cells", cells, "max_map_cells", settings)
+
+
+def check_sweep(request: EigenvalueSweepRequest, refits: bool, settings: Settings) -> None:
+    """Refuse a sweep of too many linear models, or of a table that would be fitted too often.
+
+    Raises
+    ------
+    LimitExceeded
+    """
+    points, values = check_plant(request, settings), _length(request.vary.values)
+    check_size("/vary/values", "grid points times values", points * values, "max_sweep_models", settings)
+    if refits:
+        check_table(request.aerodynamics, settings, values)
+
+
+def check_design(request: DesignRequest, settings: Settings) -> None:
+    """Refuse a design of too many points, controllers or rows.
+
+    Raises
+    ------
+    LimitExceeded
+    """
+    points, controllers = check_plant(request, settings), len(request.controllers)
     check_size("/controllers", "controllers", controllers, "max_controllers", settings)
     work = points * controllers
     check_size("/grid", "grid points times controllers", work, "max_point_designs", settings)

@@ -9,6 +9,7 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic.json_schema import models_json_schema
 
+from service.body_examples import BODIES
 from service.errors import MEDIA_TYPE, STATUS, problem
 from service.examples import NAMES, example
 from service.refusals import FieldRefusal
@@ -94,16 +95,4 @@ def _complete(path: str, method: str, operation: dict[str, Any], example_id: str
 
 
 def _bodies(path: str) -> dict[str, Any]:
-    wind_tunnel = example(NAMES[0])
-    if path == "/v1/hinge-moments":
-        wire = {
-            "geometry": {"aileron_hinge": 0.7, "tab_hinge": 0.88},
-            "aerodynamics": {"source": "thin_aerofoil", "section": "NACA 23012"},
-            "states": [{"alpha_deg": 5.0, "aileron_deg": 10.0, "tab_deg": -10.0}],
-            "chordwise": [0.25, 0.5],
-        }
-        return {"naca_23012": {"summary": "NACA 23012, hinges at 70 % and 88 %", "value": wire}}
-    if path == "/v1/linear-models":
-        parts = ("geometry", "inertia", "aerodynamics", "atmosphere", "trim", "grid")
-        return {"wind_tunnel": {"summary": "wind_tunnel", "value": {part: wind_tunnel[part] for part in parts}}}
-    return {name: {"summary": name, "value": example(name)} for name in NAMES}
+    return BODIES[path]() if path in BODIES else {name: {"summary": name, "value": example(name)} for name in NAMES}

@@ -42,7 +42,7 @@ class Place:
         if isinstance(part, int):
             self.schema = self._resolved(self.schema.get("items", {}))
             return
-        self.schema = self._resolved(self.schema.get("properties", {}).get(part, {}))
+        self.schema = self._resolved(self.schema.get("properties", {}).get(part) or self._value_of_any_key())
         self.unit = self.schema.get("unit")
 
     def follow(self, pointer: str) -> None:
@@ -72,6 +72,11 @@ class Place:
         if len(choices) == 1:
             inner = self._resolved(choices[0]) | {"nullable": True}
         return inner | {"unit": schema["unit"]} if "unit" in schema else inner
+
+    def _value_of_any_key(self) -> Schema:
+        """Schema of the values of an object whose keys are free; the empty one when there is none."""
+        values = self.schema.get("additionalProperties", {})
+        return values if isinstance(values, dict) else {}
 
     def _branch(self, part: str | int) -> Schema | None:
         """The branch of a union that a tag names: by its discriminator, or by its JSON type."""

@@ -25,6 +25,13 @@ class Settings(BaseSettings):
     )
     max_locus_gains: int = Field(default=2000, ge=2, description="Gains of a root locus")
     max_response_samples: int = Field(default=5000, ge=2, description="Samples of a response")
+    max_table_rows: int = Field(
+        default=20_000,
+        ge=1,
+        description="Rows of a table of hinge moments, times the fits of a sweep that fits it anew at each value",
+    )
+    max_map_cells: int = Field(default=50_000, ge=1, description="Grid points times cells of a steady-state map")
+    max_sweep_models: int = Field(default=5000, ge=1, description="Grid points times values of an eigenvalue sweep")
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

@@ -13,12 +13,13 @@ from design.specs import Spec
 from model.actuators import Actuator, ActuatorLimits
 from model.aerodynamics import Aerodynamics
 from model.flight import SpeedAxis
-from model.hinge_moments.camber import mean_line
-from model.hinge_moments.thin_aerofoil import ThinAerofoil
+from model.hinge_moments.expansion import Angles
 from model.section import Body, Geometry, Inertia
-from model.trim import TrimRequest
+from model.trim_request import LARGEST_TRIM_ANGLE, HeldTorque, TrimRequest
 from schedules.study import Controller, GridRequest, PlantStudy, Reference, Study
 from service.schemas import actuators, aerodynamics, controllers, flight, requests, section, weights
+from service.schemas import trim as trims
+from service.source_of import hinge_moment_source, model_refuses
 from service.spec_names import SPEC_FIELDS
 
 SPEED_AXIS: dict[str, SpeedAxis] = {
@@ -34,7 +35,7 @@ def study(request: requests.DesignRequest) -> Study:
         name=request.name,
         geometry=geometry(request.geometry),
         inertia=inertia(request.inertia),
-        aerodynamics=aerodynamic_model(request.aerodynamics, request.geometry),
+        aerodynamics=aerodynamic_model(request.aerodynamics, request.geometry, expansion_point(request.trim)),
         trim=trim(request.trim),
         grid=grid(request.grid, request.atmosphere),
         tab_actuator=tab_actuator(request.actuators.tab),
@@ -45,12 +46,13 @@ def study(request: requests.DesignRequest) -> Study:
     )
 
 
-def plant_study(request: requests.LinearModelsRequest) -> PlantStudy:
-    """The part of a study that linear models depend on."""
+def plant_study(request: requests.LinearModelsRequest, known: Aerodynamics | None = None) -> PlantStudy:
+    """The part of a study that linear models depend on; `known` aerodynamics of the request are not made again."""
+    about = expansion_point(request.trim)
     return PlantStudy(
         geometry=geometry(request.geometry),
         inertia=inertia(request.inertia),
-        aerodynamics=aerodynamic_model(request.aerodynamics, request.geometry),
+        aerodynamics=known or aerodynamic_model(request.aerodynamics, request.geometry, about),
         trim=trim(request.trim),
         grid=grid(request.grid, request.atmosphere),
     )
@@ -71,20 +73,49 @@ def body(wire: section.Body) -> Body:
     return Body(wire.mass_kg, wire.cg_offset_m, wire.inertia_kg_m2)
 
 
-def aerodynamic_model(wire: aerodynamics.Aerodynamics, hinges: section.HingeGeometry) -> Aerodynamics:
-    """Source of hinge moments and its corrections."""
-    return Aerodynamics(
-        source=ThinAerofoil(hinges.aileron_hinge, hinges.tab_hinge, mean_line(wire.section)),
-        damping=wire.damping,
-        virtual_inertia=wire.virtual_inertia,
-        compressibility=wire.compressibility,
+def aerodynamic_model(wire: aerodynamics.Aerodynamics, hinges: section.HingeGeometry, about: Angles) -> Aerodynamics:
+    """Source of hinge moments and its corrections; a table is expanded about the angles `about`.
+
+    Raises
+    ------
+    InvalidRequest : a table that cannot be fitted, or corrections that do not go together
+    """
+    source = hinge_moment_source(wire, hinges, about)
+    with model_refuses("/aerodynamics", "corrections that go together"):
+        return Aerodynamics(
+            source=source,
+            damping=wire.damping,
+            virtual_inertia=wire.virtual_inertia,
+            compressibility=wire.compressibility,
+        )
+
+
+def expansion_point(wire: trims.Trim) -> Angles:
+    """The trim's angles, as far as they are given; zero for one that is solved for."""
+    tab, aileron = (radians(angle) if isinstance(angle, float) else 0.0 for angle in (wire.tab_deg, wire.aileron_deg))
+    return Angles(alpha=radians(wire.alpha_deg), dt=tab, da=aileron)
+
+
+def trim(wire: trims.Trim) -> TrimRequest:
+    """Angles in radians; words stay."""
+    aileron, tab = wire.aileron_deg, wire.tab_deg
+    return TrimRequest(
+        alpha=radians(wire.alpha_deg),
+        aileron=aileron if isinstance(aileron, str) else trim_angle(aileron),
+        tab=tab if isinstance(tab, str) else trim_angle(tab),
+        tab_limit=solved_angle_limit(wire.tab_limit_deg),
+        aileron_limit=solved_angle_limit(wire.aileron_limit_deg),
     )
 
 
-def trim(wire: flight.Trim) -> TrimRequest:
-    """Angles in radians; the word `zero_aileron_torque` stays."""
-    tab = wire.tab_deg if isinstance(wire.tab_deg, str) else radians(wire.tab_deg)
-    return TrimRequest(alpha=radians(wire.alpha_deg), aileron=radians(wire.aileron_deg), tab=tab)
+def trim_angle(wire: float | trims.HeldTorque) -> float | HeldTorque:
+    """A given angle in radians, or the torque that decides it."""
+    return HeldTorque(wire.surface, wire.torque_n_m) if isinstance(wire, trims.HeldTorque) else radians(wire)
+
+
+def solved_angle_limit(wire: float | None) -> float:
+    """How far a solved angle is sought."""
+    return LARGEST_TRIM_ANGLE if wire is None else min(radians(wire), LARGEST_TRIM_ANGLE)
 
 
 def grid(wire: flight.Grid, atmosphere: flight.Atmosphere) -> GridRequest:

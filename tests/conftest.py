@@ -9,6 +9,12 @@ from types import SimpleNamespace  # noqa: E402
 
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
+from hypothesis import settings  # noqa: E402
+
+# On CI the same examples every time, so that a run says something about the change and not about the draw.
+settings.register_profile("ci", derandomize=True, print_blob=True)
+if os.environ.get("CI") == "true":
+    settings.load_profile("ci")
 
 
 def _wind_tunnel_plant(system, trim_request):
@@ -39,6 +45,18 @@ def plant_b():
     from model.examples import WIND_TUNNEL_TRIM, wind_tunnel_23012
 
     return _wind_tunnel_plant(wind_tunnel_23012(), WIND_TUNNEL_TRIM)
+
+
+@pytest.fixture(scope="session")
+def unsteady_a():
+    """Data set A with unsteady damping and virtual inertia over the same grid: six states."""
+    from dataclasses import replace
+
+    from model.examples import WIND_TUNNEL_TRIM, wind_tunnel
+
+    system = wind_tunnel()
+    aerodynamics = replace(system.aerodynamics, damping="unsteady", virtual_inertia=True)
+    return _wind_tunnel_plant(replace(system, aerodynamics=aerodynamics), WIND_TUNNEL_TRIM)
 
 
 @pytest.fixture(scope="session")

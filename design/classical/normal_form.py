@@ -1,13 +1,15 @@
 """Tab-only loops made non-dimensional: one family of polynomials for the whole grid.
 
-Time is counted in 1/omega_n of the servo-tab model, and each gain is multiplied by what it works on, so that
+Time is counted in 1/omega_n, the square root of the aileron's static stiffness, and each gain is multiplied by what
+it works on, so that
 
 - ``kappa_p = K_p |K_ss|``, ``kappa_f = K_f |K_ss|`` (f, the stiffness cancelled), ``kappa_d = K_d |K_ss| omega_n``,
   ``kappa_i = K_i |K_ss| / omega_n``;
-- plant ``(b x + 1) / (x^2 + 2 zeta x + 1)``, servo ``r^2 / (x^2 + 2 z r x + r^2)``, rate filter ``phi x / (x + phi)``.
+- plant ``(b x + 1) / (x^2 + 2 zeta x + 1)``, or with the lags of unsteady damping a cubic over a quartic, 1 at rest;
+  servo ``r^2 / (x^2 + 2 z r x + r^2)``, rate filter ``phi x / (x + phi)``.
 
-What is left of the flight point is zeta, b and the ratios r and phi. The loop transfer at the actuator is linear in
-the gains, ``L = sum_j kappa_j n_j / d``, and so is the closed-loop polynomial ``d + sum_j kappa_j n_j``.
+What is left of the flight point is zeta, b, the lags, and the ratios r and phi. The loop transfer at the actuator is
+linear in the gains, ``L = sum_j kappa_j n_j / d``, and so is the closed-loop polynomial ``d + sum_j kappa_j n_j``.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import numpy as np
 
 from model.actuators import Actuator
 from model.arrays import FloatArray, GridArrays
+from model.polynomial_product import times as times
 from model.servo_tab import ServoTab
 
 
@@ -51,16 +54,20 @@ class NormalForm(GridArrays):
         kind: Literal["negative_feedback", "positive_feedback"],
         rate_filter: float | None,
     ) -> NormalForm:
-        """Normal form of each point; the servo-tab model must be statically stable, the servo second order."""
+        """Normal form of each point; the servo-tab model must be statically stable, the servo second order.
+
+        Raises
+        ------
+        ValueError : the actuator has no second-order servo
+        """
         if actuator.servo_bandwidth is None or actuator.servo_damping_ratio is None:
             raise ValueError("a deflection command needs a servo with a bandwidth and a damping ratio")
-        w = np.sqrt(servo.denominator[..., 2])
+        w = np.sqrt(servo.static_stiffness)
         one = np.ones_like(w)
-        b = servo.numerator[..., 0] / servo.numerator[..., 1] * w
         r = actuator.servo_bandwidth / w
-        plant = np.stack([one, servo.denominator[..., 1] / w, one], axis=-1)
+        top, plant = _plant(servo, w)
         lag = np.stack([one, 2.0 * actuator.servo_damping_ratio * r, r**2], axis=-1)
-        lead = np.stack([b, one], axis=-1) * (r**2)[..., None]
+        lead = top * (r**2)[..., None]
         x = np.stack([one, 0.0 * one], axis=-1)
         d = times(x, times(plant, lag))
         if kind == "positive_feedback":
@@ -84,12 +91,11 @@ class NormalForm(GridArrays):
         return kappa * self.gain_units
 
 
-def times(p: FloatArray, q: FloatArray) -> FloatArray:
-    """Product of polynomials over leading axes; coefficients along the last."""
-    out = np.zeros((*np.broadcast_shapes(p.shape[:-1], q.shape[:-1]), p.shape[-1] + q.shape[-1] - 1))
-    for k in range(q.shape[-1]):
-        out[..., k : k + p.shape[-1]] += p * q[..., k : k + 1]
-    return out
+def _plant(servo: ServoTab, frequency: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Numerator and denominator of the servo-tab model in ``x = s / frequency``, both 1 at rest."""
+    top, bottom = servo.numerator, servo.denominator
+    powers = frequency[..., None] ** np.arange(bottom.shape[-1] - 1, -1, -1)
+    return top * powers[..., 1:] / top[..., -1:], bottom * powers / bottom[..., -1:]
 
 
 def _padded(p: FloatArray, length: int) -> FloatArray:

@@ -95,8 +95,7 @@ def design_classical(
 
 def _without_authority(servo: ServoTab, outcomes: Outcomes) -> Outcomes:
     """Points where no deflection of the tab moves the aileron to a steady angle."""
-    stiffness = servo.denominator[..., 2]
-    gain = servo.numerator[..., 1]
+    stiffness, gain = servo.static_stiffness, servo.static_tab_effect
     with np.errstate(invalid="ignore"):
         bad = ~((stiffness > 0) & (gain != 0))
 

@@ -12,7 +12,7 @@ from model.linear_model import LinearModel
 from model.servo_tab import ServoTab
 
 OUTPUTS = ("da", "dt", "da_rate", "dt_rate", "T_t", "T_a", "dt_command")
-#: State indices; ``da_filtered`` follows when the rate is a filtered derivative.
+#: State indices; ``da_filtered`` follows when the rate is a filtered derivative, lag states come last.
 DT, DT_RATE, DA, DA_RATE, INT_A, DA_FILTERED = range(6)
 
 
@@ -26,8 +26,8 @@ def tab_loop(
     """Assemble what is flown, over the grid.
 
     The aileron obeys the servo-tab model (2.3.22) and the tab its servo; the tab's torque is found by inverse
-    dynamics from the coupled model's first row. No actuator drives the aileron: its torque output is the trim
-    torque, which something else must hold.
+    dynamics from the coupled model's first row, lag states included. No actuator drives the aileron: its torque
+    output is the trim torque, which something else must hold.
 
     Parameters
     ----------
@@ -43,12 +43,16 @@ def tab_loop(
     if w is None or z is None:
         raise ValueError("a deflection command needs a servo with a bandwidth and a damping ratio")
     cutoff = controller.rate_filter if controller.kind == "negative_feedback" else None
-    grid, n = model.A.shape[:-2], 5 if cutoff is None else 6
+    states = ("dt", "dt_rate", "da", "da_rate", "int_a", "da_filtered")[: 5 if cutoff is None else 6]
+    grid, m = model.A.shape[:-2], len(states)
+    lags = servo.states[2:]
+    n = m + len(lags)
+    aileron = np.array([DA, DA_RATE, *range(m, n)])
     A = np.zeros((*grid, n, n))
     A[..., DT, DT_RATE] = 1.0
     A[..., DT_RATE, DT], A[..., DT_RATE, DT_RATE] = -(w**2), -2.0 * z * w
-    A[..., DA : DA_RATE + 1, DA : DA_RATE + 1] = servo.F
-    A[..., DA : DA_RATE + 1, DT : DT_RATE + 1] = servo.G
+    A[..., aileron[:, None], aileron] = servo.F
+    A[..., aileron, DT : DT_RATE + 1] = servo.G
     A[..., INT_A, DA] = -1.0
     if cutoff is not None:
         A[..., DA_FILTERED, DA], A[..., DA_FILTERED, DA_FILTERED] = cutoff, -cutoff
@@ -61,7 +65,7 @@ def tab_loop(
     K = (sigma[..., None] * sum(s.sign * s.gain[..., None] * _full(s.c, n) for s in stages))[..., None, :]
     return Loop(
         A, B, E, K, np.zeros((*grid, 1, 1)), *_outputs(model, n),
-        states=("dt", "dt_rate", "da", "da_rate", "int_a", "da_filtered")[:n],
+        states=(*states, *lags),
         inputs=("tab",), references=("r_a",), outputs=OUTPUTS, stages=stages, delay=(actuator.delay,),
     )  # fmt: skip
 
@@ -115,8 +119,7 @@ def _outputs(model: LinearModel, n: int) -> tuple[FloatArray, FloatArray, FloatA
     for row, state in enumerate((DA, DT, DA_RATE, DT_RATE)):
         C[..., row, state] = 1.0
     F[..., 4, DT_RATE], F[..., 4, DA_RATE] = model.inertia[..., 0, 0], model.inertia[..., 0, 1]
-    C[..., 4, [DT, DA]] = -model.stiffness[..., 0, :]
-    C[..., 4, [DT_RATE, DA_RATE]] = -model.damping[..., 0, :]
+    C[..., 4, [DT, DT_RATE, DA, DA_RATE, *range(n - model.lag_torque.shape[-1], n)]] = -model.air_torque[..., 0, :]
     D[..., 6, 0] = 1.0
     dt0, dt_rate0, da0, da_rate0 = np.moveaxis(model.state_offset, -1, 0)[:4]
     torque_t, torque_a = np.moveaxis(model.input_offset, -1, 0)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.frequency.branches import continuous_branches
 from design.frequency.landmarks import Landmarks, asymptotes, breakaways, crossings
 from design.frequency.locus_poles import poles_along
 from design.loop import SisoLoop
 from model.arrays import ComplexArray, FloatArray, GridArrays
+from model.branches import continuous_branches
 
 #: Without gains of the caller's, a locus runs from this part of the chosen gain to its inverse times it.
 DECADES_EACH_WAY = 2.0

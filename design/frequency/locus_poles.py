@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from design.frequency.branches import continuations, squared_gaps
 from design.frequency.poles import pole_order
 from model.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from model.branches import continuations, squared_gaps
 
 #: Every how many gains the eigenvalues themselves are computed, and again in the segments that this leaves open.
 STRIDES = (16, 4)

@@ -41,7 +41,8 @@ class LqrController:
     Attributes
     ----------
     name : unique in its study
-    weights : Bryson's rule, or explicit matrices over ``dt dt_rate da da_rate int_a`` and ``T_t T_a``
+    weights : Bryson's rule, or explicit matrices over ``dt dt_rate da da_rate int_a`` (with unsteady damping
+        then ``lag_1 lag_2``) and ``T_t T_a``
     tab_allocation : where the free tab rests when the aileron is on its reference
     reference : what follows a reference
     """
@@ -63,9 +64,10 @@ class LqrDesign(GridArrays):
 
     Attributes
     ----------
-    K : (*G, 2, 5) law ``u = -K [dt dt_rate da da_rate int_a] + N r_a``, u = [T_t, T_a] from trim [N m]
+    K : (*G, 2, n) law ``u = -K [dt dt_rate da da_rate int_a] + N r_a``, u = [T_t, T_a] from trim [N m]; n is 5,
+        or 7 with the lag states of unsteady damping after the others
     N : (*G, 2, 1) feed-forward [N m/rad]
-    X : (*G, 5, 5) solution of the Riccati equation
+    X : (*G, n, n) solution of the Riccati equation
     residual : (*G,) its relative residual in balanced coordinates
     largest_real_part : (*G,) of the eigenvalues of ``A - B K`` [1/s]
     return_difference_min : (*G,) smallest singular value of ``R^1/2 (I + L) R^-1/2`` over frequency
@@ -99,8 +101,8 @@ def design_lqr(model: LinearModel, controller: LqrController, outcomes: Outcomes
     ------
     WeightsRefused : the weights define no regulator, or fail to see a mode on the axis at every ok point
     """
-    weights = weight_matrices(controller.weights)
     plant = augment_with_integral(model)
+    weights = weight_matrices(controller.weights, plant.states)
     _check_order(weights, plant, model)
     check_weights(weights.Q, weights.R, weights.N)
     if outcomes is None:

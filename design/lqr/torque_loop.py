@@ -31,9 +31,8 @@ def lqr_loop(model: LinearModel, design: LqrDesign) -> Loop:
     C, D = np.zeros((*grid, outputs, n)), np.zeros((*grid, outputs, m))
     offset = np.zeros((*grid, outputs))
     for row, name in enumerate(ANGLES_AND_RATES):
-        state = plant.states.index(name)
-        C[..., row, state] = 1.0
-        offset[..., row] = model.state_offset[..., state]
+        C[..., row, plant.states.index(name)] = 1.0
+        offset[..., row] = model.state_offset[..., model.states.index(name)]
     D[..., -m:, :] = np.eye(m)
     offset[..., -m:] = model.input_offset
     hole = np.where(ok, 0.0, np.nan)

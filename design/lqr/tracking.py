@@ -13,6 +13,9 @@ from model.linear_model import LinearModel
 
 TabAllocation = Literal["zero_aileron_torque"]
 
+#: Where the integral stands among the states: behind angles and rates, before lag states.
+INT_A = 4
+
 #: Beyond this many radians of tab for a radian of aileron, the tab has no authority over the aileron.
 MAX_TAB_TRAVEL = 1e3
 
@@ -24,7 +27,7 @@ class TrackingPlant(GridArrays):
     Attributes
     ----------
     A (*G, n + 1, n + 1), B (*G, n + 1, 2), E (*G, n + 1, 1)
-    states : the model's, then ``int_a`` [rad s]
+    states : ``dt dt_rate da da_rate``, then ``int_a`` [rad s], then the model's lag states if it has any
     """
 
     A: FloatArray
@@ -39,7 +42,7 @@ class SteadyState(GridArrays):
 
     Attributes
     ----------
-    N_x : (*G, n, 1) states for a radian of aileron
+    N_x : (*G, n, 1) states of the model for a radian of aileron, lag states settled
     N_u : (*G, 2, 1) torques for a radian of aileron [N m/rad], order [tab, aileron]
     attainable : (*G,) False where the tab has no authority: N_x and N_u are nan there
     """
@@ -54,10 +57,11 @@ def augment_with_integral(model: LinearModel) -> TrackingPlant:
     n, aileron = len(model.states), model.states.index("da")
     grid = model.A.shape[:-2]
     A, B, E = np.zeros((*grid, n + 1, n + 1)), np.zeros((*grid, n + 1, 2)), np.zeros((*grid, n + 1, 1))
-    A[..., :n, :n], B[..., :n, :] = model.A, model.B
-    A[..., n, aileron] = -1.0
-    E[..., n, 0] = 1.0
-    return TrackingPlant(A, B, E, (*model.states, "int_a"))
+    own = [i for i in range(n + 1) if i != INT_A]
+    A[..., np.ix_(own, own)[0], np.ix_(own, own)[1]], B[..., own, :] = model.A, model.B
+    A[..., INT_A, aileron] = -1.0
+    E[..., INT_A, 0] = 1.0
+    return TrackingPlant(A, B, E, (*model.states[:INT_A], "int_a", *model.states[INT_A:]))
 
 
 def steady_state(model: LinearModel, tab_allocation: TabAllocation = "zero_aileron_torque") -> SteadyState:
@@ -92,7 +96,6 @@ def feed_forward(K: FloatArray, rest: SteadyState) -> FloatArray:
 
     Parameters
     ----------
-    K : (*G, 2, n + 1) gain on the states and on the integral of the error
+    K : (*G, 2, n + 1) gain on the states and, at `INT_A` among them, on the integral of the error
     """
-    n = rest.N_x.shape[-2]
-    return np.asarray(K[..., :n] @ rest.N_x + rest.N_u)
+    return np.asarray(np.delete(K, INT_A, axis=-1) @ rest.N_x + rest.N_u)

@@ -1,7 +1,7 @@
 """Weights of the quadratic cost: Bryson's rule or explicit matrices, and what no solve can repair (seed 5.1).
 
-``int( x'Qx + u'Ru + 2x'Nu ) dt`` over the states ``dt dt_rate da da_rate int_a`` [rad, rad/s, rad s] and the inputs
-``T_t T_a`` [N m].
+``int( x'Qx + u'Ru + 2x'Nu ) dt`` over the states ``dt dt_rate da da_rate int_a`` [rad, rad/s, rad s], with unsteady
+damping ``lag_1 lag_2`` [rad] after them, and the inputs ``T_t T_a`` [N m].
 """
 
 from __future__ import annotations
@@ -70,7 +70,10 @@ class BrysonWeights:
 
 @dataclass(frozen=True, eq=False)
 class ExplicitWeights:
-    """Q (5, 5), R (2, 2), N (5, 2) or None, in SI and radians over `WEIGHTED_STATES` and `WEIGHTED_INPUTS`."""
+    """Q (n, n), R (2, 2), N (n, 2) or None, in SI and radians over all states and `WEIGHTED_INPUTS`.
+
+    n is 5, `WEIGHTED_STATES`; with the two lag states of unsteady damping after them 7.
+    """
 
     Q: FloatArray
     R: FloatArray
@@ -85,16 +88,20 @@ class ExplicitWeights:
                 object.__setattr__(self, field.name, matrix)
 
 
-def weight_matrices(weights: BrysonWeights | ExplicitWeights) -> ExplicitWeights:
-    """Q, R and N of either kind of weights."""
+def weight_matrices(
+    weights: BrysonWeights | ExplicitWeights, states: tuple[str, ...] = WEIGHTED_STATES
+) -> ExplicitWeights:
+    """Q, R and N of either kind of weights, over `states`; Bryson's rule weighs none but `WEIGHTED_STATES`."""
     if isinstance(weights, ExplicitWeights):
         return weights
-    states = (weights.tab, weights.tab_rate, weights.aileron, weights.aileron_rate, weights.aileron_integral)
+    largest = (weights.tab, weights.tab_rate, weights.aileron, weights.aileron_rate, weights.aileron_integral)
+    acceptable = dict(zip(WEIGHTED_STATES, largest, strict=True))
+    values = [acceptable.get(state, np.inf) for state in states]
     inputs = (weights.tab_torque, weights.aileron_torque)
     # A value too small to square makes an infinite weight, which `check_weights` refuses.
     with np.errstate(over="ignore", divide="ignore"):
         return ExplicitWeights(
-            Q=np.diag(np.square(1.0 / np.array(states))), R=np.diag(np.square(1.0 / np.array(inputs)))
+            Q=np.diag(np.square(1.0 / np.array(values))), R=np.diag(np.square(1.0 / np.array(inputs)))
         )
 
 

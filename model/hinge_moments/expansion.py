@@ -5,7 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from model.arrays import FloatArray, Floats, GridArrays
+import numpy as np
+
+from model.arrays import BoolArray, FloatArray, Floats, GridArrays
+
+
+@dataclass(frozen=True)
+class Angles:
+    """Incidence, tab angle (relative to the aileron) and aileron angle [rad]; order [alpha, dt, da] in arrays."""
+
+    alpha: float = 0.0
+    dt: float = 0.0
+    da: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,3 +46,17 @@ class HingeMomentSource(Protocol):
         Arguments broadcast to the shape ``*G`` of the answer.
         """
         ...
+
+    def covers(self, alpha: Floats, dt: Floats, da: Floats) -> BoolArray:
+        """Mask (*G,) of the angles [rad] that the source knows about; `at` answers beyond them too."""
+        ...
+
+    @property
+    def domain(self) -> str:
+        """What `covers` covers, in words and degrees."""
+        ...
+
+
+def every_angle(alpha: Floats, dt: Floats, da: Floats) -> BoolArray:
+    """Mask (*G,) that is True everywhere: what a linear source covers."""
+    return np.ones(np.broadcast_shapes(np.shape(alpha), np.shape(dt), np.shape(da)), dtype=bool)

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from model.arrays import FloatArray, Floats
+from model.arrays import BoolArray, FloatArray, Floats
 from model.hinge_moments.camber import SYMMETRIC, MeanLine
 from model.hinge_moments.closed_forms import (
     between_surfaces,
@@ -17,7 +17,7 @@ from model.hinge_moments.closed_forms import (
     parabola_moment,
     ramp_moment,
 )
-from model.hinge_moments.expansion import HingeMoments
+from model.hinge_moments.expansion import HingeMoments, every_angle
 from model.hinge_moments.pressure import (
     flap_pressure,
     incidence_pressure,
@@ -78,6 +78,15 @@ class ThinAerofoil:
         angles = np.stack(np.broadcast_arrays(*(np.asarray(x, float) for x in (alpha, dt, da))), axis=-1)
         value = self.offset + np.sum(self.gradient * angles[..., None, :], axis=-1)
         return HingeMoments(value, np.broadcast_to(self.gradient, (*value.shape[:-1], 2, 3)))
+
+    def covers(self, alpha: Floats, dt: Floats, da: Floats) -> BoolArray:
+        """Every angle (*G,): the theory is linear and knows no stall; see `HingeMomentSource.covers`."""
+        return every_angle(alpha, dt, da)
+
+    @property
+    def domain(self) -> str:
+        """Every angle."""
+        return "every angle"
 
     def pressure_difference(self, x: FloatArray, alpha: Floats, dt: Floats, da: Floats) -> FloatArray:
         """``Cp_lower - Cp_upper`` along the chord, camber included (seed Fig 2.3).

@@ -11,6 +11,7 @@ from design.specs import Verdict
 from schedules.files import FILE_FORMATS
 from schedules.run import DesignedController, DesignedEnvelope
 from service.presenters.grid import air_document, grid_document, outcome_documents, warning_documents
+from service.presenters.hinge_moments import fit_document
 from service.spec_names import spec_field
 from service.version import code_version, solver
 
@@ -28,6 +29,7 @@ def design_document(ident: str, request: dict[str, Any], created_at: str, envelo
         "outcomes": plant.outcomes.codes,
         "reasons": plant.outcomes.reasons,
         "warnings": warning_documents(envelope.warnings),
+        "hinge_moment_fit": fit_document(plant.system.aerodynamics.source),
         "controllers": [_controller(controller) for controller in envelope.controllers],
         "links": links(ident, [controller.request.name for controller in envelope.controllers]),
     }
@@ -39,6 +41,7 @@ def _controller(controller: DesignedController) -> dict[str, Any]:
         "kind": controller.request.kind,
         **outcome_documents(controller.outcomes),
         "gains": [_gain(gain) for gain in controller.gains],
+        "reduced_frequency": controller.reduced_frequency,
         "verdicts": [verdict_over_grid(verdict) for verdict in controller.verdicts],
     }
 

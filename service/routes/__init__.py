@@ -4,12 +4,15 @@ from service.routes import (
     atmosphere,
     controllers,
     designs,
+    eigenvalue_sweeps,
     examples,
     hinge_moments,
     linear_models,
     meta,
     points,
     root_locus,
+    similarity,
+    steady_state_maps,
 )
 from service.routes import schedules as schedule_files
 
@@ -21,6 +24,9 @@ ROUTERS = (
     controllers.router,
     schedule_files.router,
     linear_models.router,
+    eigenvalue_sweeps.router,
+    steady_state_maps.router,
+    similarity.router,
     hinge_moments.router,
     atmosphere.router,
     examples.router,

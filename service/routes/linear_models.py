@@ -6,9 +6,10 @@ from fastapi import APIRouter, Request, Response
 
 from service.answering import answer, encode
 from service.designs import analysed
-from service.limits import check_grid
+from service.limits import check_plant
 from service.openapi import BODY, problems
 from service.presenters.grid import air_document, grid_document, outcome_documents, warning_documents
+from service.presenters.hinge_moments import fit_document
 from service.presenters.plant import plant_document
 from service.reading import JsonRoute
 from service.schemas.point import LinearModels
@@ -21,13 +22,14 @@ router = APIRouter(prefix="/v1/linear-models", tags=["model"], route_class=JsonR
 @router.post("", response_model=LinearModels, responses=problems(*BODY), dependencies=[HEAVY])
 def linear_models(request: Request, wanted: LinearModelsRequest, settings: SettingsHere) -> Response:
     """Hinge moments, trim, linear model, poles and servo-tab at every grid point. Nothing is kept."""
-    check_grid(wanted.grid, settings)
+    check_plant(wanted, settings)
     plant = analysed(wanted)
     document = {
         "grid": grid_document(plant.grid),
         "air": air_document(plant.grid.condition),
         **outcome_documents(plant.outcomes),
         "warnings": warning_documents(plant.warnings),
+        "hinge_moment_fit": fit_document(plant.system.aerodynamics.source),
         "points": [plant_document(plant, point) for point in range(plant.outcomes.codes.size)],
     }
     return answer(request, encode(document))

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from service.schemas.hinge_moments import HingeMomentFit
 from service.schemas.requests import DesignRequest
 from service.schemas.wire import Answer
 
@@ -91,6 +92,9 @@ class Controller(Answer):
     outcomes: GridOutcomes
     reasons: GridReasons
     gains: list[Gain]
+    reduced_frequency: GridNumbers = Field(
+        description="k = |s| c / (2 V) of the fastest closed-loop mode of the surfaces; null where there are no gains"
+    )
     verdicts: list[Verdict]
 
 
@@ -118,6 +122,7 @@ class Design(Answer):
     outcomes: GridOutcomes
     reasons: GridReasons
     warnings: list[EnvelopeWarning]
+    hinge_moment_fit: HingeMomentFit | None
     controllers: list[Controller]
     links: Links
 

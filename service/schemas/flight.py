@@ -7,8 +7,6 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    Discriminator,
     Field,
     SerializerFunctionWrapHandler,
     Tag,
@@ -17,6 +15,7 @@ from pydantic import (
 )
 
 from model.atmosphere import MAX_ALTITUDE, MIN_ALTITUDE
+from service.schemas.forms import BY_JSON_TYPE
 from service.schemas.wire import Request, refusal
 
 Altitude = Annotated[float, Field(ge=MIN_ALTITUDE, le=MAX_ALTITUDE)]
@@ -37,24 +36,6 @@ def increasing(values: list[float]) -> list[float]:
                 at=f"/{place}",
             )
     return values
-
-
-def json_kind(value: Any) -> str | None:
-    """JSON type that tells the forms of a field apart; None when it is none of them."""
-    if isinstance(value, list):
-        return "array"
-    if isinstance(value, (dict, BaseModel)):
-        return "object"
-    if isinstance(value, str):
-        return "string"
-    return "number" if isinstance(value, (int, float)) and not isinstance(value, bool) else None
-
-
-BY_JSON_TYPE = Discriminator(
-    json_kind,
-    custom_error_type="wrong_form",
-    custom_error_message="neither of the forms this field may take",
-)
 
 
 class Span(Request):
@@ -156,21 +137,6 @@ class Atmosphere(Request):
 
     temperature_offset_k: TemperatureOffset = Field(
         default=0.0, description="Added to the standard temperature at every altitude; the pressure stays"
-    )
-
-
-class Trim(Request):
-    """Steady angles that the linear models are about."""
-
-    alpha_deg: Annotated[float, Field(ge=-30.0, le=30.0)] = Field(default=0.0, description="Angle of attack")
-    aileron_deg: SurfaceAngle = Field(default=0.0, description="Aileron deflection, trailing edge up")
-    tab_deg: Annotated[
-        Annotated[SurfaceAngle, Tag("number")] | Annotated[Literal["zero_aileron_torque"], Tag("string")],
-        BY_JSON_TYPE,
-    ] = Field(
-        default=0.0,
-        description="Tab deflection relative to the aileron, trailing edge up, or `zero_aileron_torque`: "
-        "the tab angle at which the aileron holds itself",
     )
 
 

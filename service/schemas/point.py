@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from service.schemas.design import EnvelopeWarning, Grid, GridAir, GridOutcomes, GridReasons, Kind, OutcomeCode
+from service.schemas.hinge_moments import HingeMomentFit
 from service.schemas.wire import Answer
 
 Matrix = list[list[float]]
@@ -207,4 +208,5 @@ class LinearModels(Answer):
     outcomes: GridOutcomes
     reasons: GridReasons
     warnings: list[EnvelopeWarning]
+    hinge_moment_fit: HingeMomentFit | None
     points: list[Plant]

@@ -7,10 +7,11 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from service.schemas.actuators import Actuators
-from service.schemas.aerodynamics import Aerodynamics
+from service.schemas.aerodynamics import Aerodynamics, ThinAerofoil
 from service.schemas.controllers import Classical, Controller
-from service.schemas.flight import Atmosphere, Grid, Reference, SurfaceAngle, Trim
+from service.schemas.flight import Atmosphere, Grid, Reference, SurfaceAngle
 from service.schemas.section import Geometry, HingeGeometry, Inertia
+from service.schemas.trim import Trim
 from service.schemas.wire import Request, refusal
 
 
@@ -60,9 +61,9 @@ class DesignRequest(LinearModelsRequest):
         return self
 
 
-#: How near to a hinge the pressure may be asked for, fraction of the chord.
+#: How near to the leading edge and a hinge, where it is infinite, the pressure may be asked for: fraction of the chord.
 HINGE_CLEARANCE = 1e-9
-ChordPlace = Annotated[float, Field(gt=0.0, le=1.0)]
+ChordPlace = Annotated[float, Field(ge=HINGE_CLEARANCE, le=1.0)]
 
 
 class HingeState(Request):
@@ -73,6 +74,14 @@ class HingeState(Request):
     tab_deg: SurfaceAngle
 
 
+class About(Request):
+    """Angles about which derivatives are wanted, and a table is expanded."""
+
+    alpha_deg: Annotated[float, Field(ge=-30.0, le=30.0)] = 0.0
+    aileron_deg: SurfaceAngle = 0.0
+    tab_deg: SurfaceAngle = 0.0
+
+
 class HingeMomentsRequest(Request):
     """Hinge-moment coefficients of a section, no air and no grid."""
 
@@ -80,8 +89,11 @@ class HingeMomentsRequest(Request):
     aerodynamics: Aerodynamics
     states: Annotated[list[HingeState], Field(min_length=1, max_length=1000)]
     chordwise: Annotated[list[ChordPlace], Field(min_length=1, max_length=1000)] | None = Field(
-        default=None, description="Places along the chord, as fractions, where the pressure difference is wanted"
+        default=None,
+        description="Places along the chord, as fractions, where the pressure difference is wanted; only "
+        "thin-aerofoil theory knows it",
     )
+    about: About = Field(default_factory=About, description="Where the derivatives are wanted")
 
     @model_validator(mode="after")
     def no_mach_number(self) -> Self:
@@ -96,13 +108,15 @@ class HingeMomentsRequest(Request):
 
     @model_validator(mode="after")
     def pressure_away_from_hinges(self) -> Self:
-        """Refuse the pressure at a hinge, where thin-aerofoil theory makes it infinite."""
+        """Refuse the pressure at a hinge, where thin-aerofoil theory makes it infinite; other sources have none."""
+        if self.chordwise is not None and not isinstance(self.aerodynamics, ThinAerofoil):
+            raise refusal("only thin-aerofoil theory knows the pressure along the chord", "null", at="/chordwise")
         hinges = (self.geometry.aileron_hinge, self.geometry.tab_hinge)
         for place, x in enumerate(self.chordwise or ()):
             if any(abs(x - hinge) < HINGE_CLEARANCE for hinge in hinges):
                 raise refusal(
                     f"the pressure difference is infinite at the hinge at {x:g}",
-                    f"> 0 and <= 1, at least {HINGE_CLEARANCE:g} away from both hinges",
+                    f"<= 1, at least {HINGE_CLEARANCE:g} away from the leading edge and both hinges",
                     at=f"/chordwise/{place}",
                 )
         return self

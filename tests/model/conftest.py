@@ -8,7 +8,7 @@ import pytest
 from model import examples
 from model.aerodynamics import Aerodynamics
 from model.flight import flight_condition, flight_grid
-from model.hinge_moments.expansion import HingeMoments
+from model.hinge_moments.expansion import HingeMoments, every_angle
 from model.system import TabAileron
 
 # Linear part of the made-up source: rows [tab, aileron], columns alpha, dt, da.
@@ -31,6 +31,11 @@ class PolynomialSource:
         others = np.stack([x[..., 1] * x[..., 2], x[..., 0] * x[..., 2], x[..., 0] * x[..., 1]], axis=-1)
         gradient = LINEAR + 2 * QUADRATIC * x + 3 * CUBIC * x**2 + others
         return HingeMoments(value + product, gradient)
+
+    def covers(self, alpha, dt, da):
+        return every_angle(alpha, dt, da)
+
+    domain = "every angle"
 
 
 @pytest.fixture(scope="session")

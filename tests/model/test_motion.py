@@ -1,6 +1,10 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
+from model.flight import flight_condition
 from model.motion import acceleration, aerodynamic_torque, required_torque
 
 OPTIONS = [
@@ -80,3 +84,31 @@ def test_batched_equals_single(example, grid, variant, options):
         np.testing.assert_allclose(forward[i, j], single, rtol=1e-13)
         single = required_torque(system, point, alpha[j], states[i, j], torque[i, j])
         np.testing.assert_allclose(inverse[i, j], single, rtol=1e-13)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    start=st.tuples(*[st.floats(-0.3, 0.3), st.floats(-20.0, 20.0)] * 2),
+    torque=st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
+)
+def test_energy_is_conserved_with_the_air_off(start, torque):
+    """What the actuators put in is what the bodies' kinetic energy gains; without torque it stays as it is."""
+    from model.examples import wind_tunnel
+
+    system = wind_tunnel()
+    still = flight_condition(0.0, "airspeed", 1e-7)
+    J = system.inertia_matrix
+
+    def motion(t, x, T):
+        dt2, da2 = acceleration(system, still, 0.1, x, np.array(T))
+        return [x[1], dt2, x[3], da2]
+
+    def kinetic(x):
+        rates = np.array([x[1], x[3]])
+        return 0.5 * rates @ J @ rates
+
+    for T in ((0.0, 0.0), torque):
+        end = solve_ivp(motion, (0.0, 0.3), start, args=(T,), rtol=1e-10, atol=1e-12).y[:, -1]
+        work = T[0] * (end[0] - start[0]) + T[1] * (end[2] - start[2])
+        scale = kinetic(start) + kinetic(end) + 1e-6
+        assert abs(kinetic(end) - kinetic(start) - work) < 1e-7 * scale

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from design.outcome import Outcome
-from model.examples import WIND_TUNNEL_TRIM, airliner_aileron, wind_tunnel
+from model.examples import WIND_TUNNEL_TRIM, airliner_aileron, wind_tunnel, wind_tunnel_23012
+from model.hinge_moments.interpolant import fit_interpolant
+from model.hinge_moments.table import table_of_rows
+from model.hinge_moments.taylor import fit_taylor
+from model.hinge_moments.xfoil_naca23012 import xfoil_naca23012
 from model.trim import TrimRequest
 from schedules.analysis import analyse
 from schedules.study import GridRequest, PlantStudy
@@ -57,3 +61,41 @@ def test_floating_aileron_needs_no_torque():
     plant = analyse(_study(wind_tunnel(), GRID, trim))
     assert plant.outcomes.codes.tolist() == [[Outcome.OK] * 4] * 2
     np.testing.assert_array_equal(plant.trim.torque[..., 1], 0.0)
+
+
+def _with_source(source):
+    system = wind_tunnel_23012()
+    return replace(system, aerodynamics=replace(system.aerodynamics, source=source))
+
+
+@pytest.mark.parametrize("fit", [fit_taylor, fit_interpolant])
+def test_trims_outside_the_table_are_outside_the_model(fit):
+    system = _with_source(fit(xfoil_naca23012()))
+    inside = analyse(_study(system, GRID, TrimRequest(np.deg2rad(5.0), np.deg2rad(20.0), np.deg2rad(-20.0))))
+    assert inside.outcomes.ok.all()
+    for trim in (TrimRequest(np.deg2rad(5.5)), TrimRequest(0.0, np.deg2rad(21.0)), TrimRequest(0.0, 0.0, -0.4)):
+        plant = analyse(_study(system, GRID, trim))
+        assert plant.outcomes.codes.tolist() == [[Outcome.OUTSIDE_MODEL] * 4] * 2
+        assert "outside the hinge-moment data: alpha 0 to 5, tab -20 to 20" in plant.outcomes.reasons[1, 3]
+    assert "alpha 0, tab -22.92, aileron 0 deg" in plant.outcomes.reasons[0, 0]
+
+
+@pytest.mark.parametrize("fit", [fit_taylor, fit_interpolant])
+def test_tab_angle_sought_beyond_the_table_is_outside_the_model(fit):
+    whole = xfoil_naca23012()
+    (alpha, dt, da), (tab, aileron) = whole.angles.T, whole.coefficients.T
+    kept = np.abs(dt) < np.deg2rad(6.0)
+    table = table_of_rows(alpha=alpha[kept], dt=dt[kept], da=da[kept], C_Ht=tab[kept], C_Ha=aileron[kept])
+    request = TrimRequest(0.0, np.deg2rad(-15.0), "zero_aileron_torque")
+    found = analyse(_study(_with_source(fit(whole)), GRID, request))
+    assert found.outcomes.ok.all()
+    assert np.all(found.trim.state[..., 0] > np.deg2rad(6.0))
+    lost = analyse(_study(_with_source(fit(table)), GRID, request))
+    assert lost.outcomes.codes.tolist() == [[Outcome.OUTSIDE_MODEL] * 4] * 2
+
+
+def test_supersonic_points_keep_their_own_reason_beside_a_table():
+    system = _with_source(fit_interpolant(xfoil_naca23012()))
+    plant = analyse(_study(system, GridRequest((0.0,), "airspeed", (50.0, 345.0)), TrimRequest(0.2)))
+    assert "Mach" in plant.outcomes.reasons[0, 1]
+    assert "hinge-moment data" in plant.outcomes.reasons[0, 0]

@@ -67,9 +67,10 @@ def test_verdicts_say_where_the_worst_point_is(wind_tunnel_envelope):
 
 
 def test_tab_only_controllers_warn_of_the_torque_at_trim(wind_tunnel_envelope, wind_tunnel_study):
-    assert [w.code for w in wind_tunnel_envelope.warnings] == ["aileron_torque_at_trim"]
+    assert "aileron_torque_at_trim" in [w.code for w in wind_tunnel_envelope.warnings]
     floating = replace(wind_tunnel_study.trim, tab="zero_aileron_torque")
-    assert run(replace(wind_tunnel_study, trim=floating, controllers=wind_tunnel_study.controllers[1:2])).warnings == ()
+    found = run(replace(wind_tunnel_study, trim=floating, controllers=wind_tunnel_study.controllers[1:2])).warnings
+    assert [w.code for w in found] == ["reduced_frequency"]
 
 
 def test_points_outside_the_model_carry_nothing_and_lose_no_others(wind_tunnel_study):

@@ -98,6 +98,20 @@ def test_a_failed_point_is_a_value(client: TestClient, quick: Any) -> None:
     assert point["reason"] == controller["reasons"][0][1]
 
 
+def test_reduced_frequency_over_the_grid(client: TestClient, design: dict[str, Any]) -> None:
+    """k = |s| c / (2 V) of a closed-loop pole, and a warning that quasi-steady damping is too quick for it."""
+    for controller in design["controllers"]:
+        k = np.array(controller["reduced_frequency"])
+        assert k.shape == (2, 4)
+        point = client.get(f"/v1/designs/{design['id']}/points/0").json()
+        (here,) = (c for c in point["controllers"] if c["name"] == controller["name"])
+        found = [abs(complex(p["re"], p["im"])) * 0.6 / (2 * point["air"]["airspeed_m_s"]) for p in here["poles"]]
+        assert np.min(np.abs(np.array(found) / k[0, 0] - 1)) < 1e-6
+    (warning,) = (w for w in design["warnings"] if w["code"] == "reduced_frequency")
+    largest = np.max([c["reduced_frequency"] for c in design["controllers"]], axis=0)
+    assert warning["points"] == np.flatnonzero(largest > 0.05).tolist()
+
+
 def test_not_modified(client: TestClient, design: dict[str, Any]) -> None:
     for path in (f"/v1/designs/{design['id']}", f"/v1/designs/{design['id']}/schedules/nf.mat", "/v1/limits"):
         tag = client.get(path).headers["ETag"]

@@ -66,6 +66,9 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/atmosphere"),
         ("post", "/v1/hinge-moments"),
         ("post", "/v1/linear-models"),
+        ("post", "/v1/eigenvalue-sweeps"),
+        ("post", "/v1/steady-state-maps"),
+        ("post", "/v1/similarity"),
         ("get", "/v1/examples"),
         ("get", "/v1/examples/{name}"),
         ("get", "/v1/limits"),
@@ -84,7 +87,7 @@ def test_every_body_example_runs(client: TestClient, document: dict[str, Any]) -
             assert response.status_code in (200, 201), (path, name, response.text)
             assert str(response.status_code) in operation["responses"]
             ran.append((path, name))
-    assert len(ran) == 5
+    assert len(ran) == 17
 
 
 @pytest.mark.usefixtures("design")
@@ -116,7 +119,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 16
+    assert checked == 19
 
 
 def test_every_error_is_declared_with_its_shape(document: dict[str, Any]) -> None:

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from design.frequency import locus_poles
-from design.frequency.branches import successors
 from design.frequency.locus_poles import poles_along
 from design.frequency.poles import pole_order
+from model.branches import successors
 from tests.design.siso_loops import stabilised
 
 

@@ -9,7 +9,12 @@ from model.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 
 def continuous_branches(values: ComplexArray) -> ComplexArray:
-    """Branches (N, n, K) through lists of eigenvalues (N, K, n), numbered by their places in the first list.
+    """Branches (N, n, K) through lists of eigenvalues (N, K, n), numbered by their places in the first list."""
+    return np.swapaxes(np.take_along_axis(values, branch_places(values), axis=-1), 1, 2)
+
+
+def branch_places(values: ComplexArray) -> IntArray:
+    """Where each branch lies in each list: (N, K, n) gives places (N, K, n), in the order of the first list.
 
     The products of the matchings of `successors`. Where two poles meet, either continuation of each is as
     continuous as the other; the lists are then followed in their own order, so that sorted lists give branches
@@ -24,7 +29,7 @@ def continuous_branches(values: ComplexArray) -> ComplexArray:
         places[:, done : k + 1] = place[:, None]
         place, done = np.take_along_axis(follows[:, k], place, axis=-1), k + 1
     places[:, done:] = place[:, None]
-    return np.swapaxes(np.take_along_axis(values, places, axis=-1), 1, 2)
+    return places
 
 
 def successors(values: ComplexArray) -> IntArray:

@@ -1,0 +1,124 @@
+"""Bodies of the routes about the plant, which the documentation shows and which run as they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from service.examples import NAMES, example
+
+Examples = dict[str, dict[str, Any]]
+
+#: A small table, linear in the angles: two incidences by three aileron by three tab angles.
+ROWS = [
+    [
+        alpha,
+        aileron,
+        tab,
+        round(-9e-4 * alpha + 1.3e-3 * aileron + 1.8e-3 * tab, 6),
+        round(6e-5 * aileron + 1.5e-4 * tab, 6),
+    ]
+    for alpha in (0.0, 5.0)
+    for aileron in (-10.0, 0.0, 10.0)
+    for tab in (-10.0, 0.0, 10.0)
+]
+CSV = "alpha_deg,da_deg,dt_deg,C_Ha,C_Ht\n" + "".join(",".join(f"{x:g}" for x in row) + "\n" for row in ROWS)
+
+DERIVATIVES = {
+    "source": "derivatives",
+    "C_Ha_0": -0.0014,
+    "C_Ha_alpha": -0.0357,
+    "C_Ha_da": 0.0683,
+    "C_Ha_dt": 0.1005,
+    "C_Ht_0": -0.0001,
+    "C_Ht_alpha": -0.0021,
+    "C_Ht_da": 0.0037,
+    "C_Ht_dt": 0.0084,
+}
+TABLE = {"source": "table", "rows": ROWS, "fit": {"method": "taylor", "order": 2, "window_deg": None}}
+MEAN_LINE = [[0.0, 0.0], [0.1, 0.011], [0.25, 0.018], [0.5, 0.0165], [0.75, 0.0095], [1.0, 0.0]]
+
+
+def plant() -> dict[str, Any]:
+    """The plant part of the example `wind_tunnel`."""
+    document = example(NAMES[0])
+    return {part: document[part] for part in ("geometry", "inertia", "aerodynamics", "atmosphere", "trim", "grid")}
+
+
+def _hinge_moments() -> Examples:
+    wire = {
+        "geometry": {"aileron_hinge": 0.7, "tab_hinge": 0.88},
+        "aerodynamics": {"source": "thin_aerofoil", "section": "NACA 23012"},
+        "states": [{"alpha_deg": 5.0, "aileron_deg": 10.0, "tab_deg": -10.0}],
+    }
+    csv = {"source": "table", "csv": CSV, "fit": {"method": "cubic"}}
+    mean_line = {"source": "thin_aerofoil", "section": MEAN_LINE}
+    return {
+        "naca_23012": _shown("NACA 23012, hinges at 70 % and 88 %", wire | {"chordwise": [0.25, 0.5]}),
+        "mean_line": _shown("a mean line through points", wire | {"aerodynamics": mean_line}),
+        "derivatives": _shown("eight given numbers", wire | {"aerodynamics": DERIVATIVES}),
+        "table": _shown("rows, expanded to order 2", wire | {"aerodynamics": TABLE}),
+        "csv": _shown("rows as CSV, interpolated", wire | {"aerodynamics": csv}),
+    }
+
+
+def _linear_models() -> Examples:
+    floating = {"alpha_deg": 2.0, "tab_deg": "zero_aileron_torque"}
+    better = plant()["aerodynamics"] | {"damping": "unsteady", "virtual_inertia": True}
+    return {
+        "wind_tunnel": _shown("wind_tunnel", plant()),
+        "table": _shown(
+            "from a table, trimmed without aileron torque", plant() | {"aerodynamics": TABLE, "trim": floating}
+        ),
+        "unsteady": _shown("with the lag of the air: six states", plant() | {"aerodynamics": better}),
+    }
+
+
+def _eigenvalue_sweeps() -> Examples:
+    tab_chord = {"quantity": "tab_chord_ratio", "values": {"from": 0.03, "to": 0.47, "count": 12}}
+    field = {"pointer": "/inertia/tab/inertia_kg_m2", "values": [1e-4, 2.1e-4, 4e-4]}
+    return {
+        "airspeed": _shown(
+            "over airspeed", plant() | {"vary": {"quantity": "airspeed_m_s", "values": [20.0, 35.0, 50.0]}}
+        ),
+        "tab_chord": _shown("over the tab's chord (seed Fig 2.13)", plant() | {"vary": tab_chord}),
+        "any_field": _shown("over any number of the request", plant() | {"vary": field}),
+    }
+
+
+def _steady_state_maps() -> Examples:
+    plane = {"aileron_deg": [-10.0, 0.0, 10.0], "tab_deg": {"from": -20.0, "to": 20.0, "count": 5}}
+    limits = {"tab": {"deflection_deg": 25.0, "torque_n_m": 2.0}, "aileron": {"deflection_deg": 25.0}}
+    return {"wind_tunnel": _shown("wind_tunnel", plant() | {"deflections": plane, "limits": limits})}
+
+
+def _similarity() -> Examples:
+    measured = {
+        "omega_n_rad_s": 77.5,
+        "damping_ratio": 0.19,
+        "dc_gain": -1.2,
+        "chord_m": 0.6,
+        "span_m": 0.8,
+        "inertia_kg_m2": 0.0055,
+        "airspeed_m_s": 50.0,
+    }
+    airliner = example("airliner_aileron")
+    full_size = {part: airliner[part] for part in plant()} | {"measured": measured}
+    return {
+        "wind_tunnel": _shown("wind_tunnel", plant() | {"tolerance": 0.1}),
+        "full_size": _shown("a measured wind-tunnel model scaled to an airliner's aileron", full_size),
+    }
+
+
+def _shown(summary: str, value: dict[str, Any]) -> dict[str, Any]:
+    return {"summary": summary, "value": value}
+
+
+#: Path -> its examples, by name.
+BODIES: dict[str, Callable[[], Examples]] = {
+    "/v1/hinge-moments": _hinge_moments,
+    "/v1/linear-models": _linear_models,
+    "/v1/eigenvalue-sweeps": _eigenvalue_sweeps,
+    "/v1/steady-state-maps": _steady_state_maps,
+    "/v1/similarity": _similarity,
+}

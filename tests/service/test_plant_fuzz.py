@@ -1,0 +1,67 @@
+"""Random damage to the examples of every route about the plant: never a 500, always a known shape."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from service.body_examples import BODIES
+
+JSON = {"Content-Type": "application/json"}
+EXAMPLES = [(path, shown["value"]) for path, examples in BODIES.items() for shown in examples().values()]
+
+NUMBERS = st.sampled_from([0, -1, 1e-9, 0.5, 1, 30, 60, 90, 1e3, 1e9, 1e308, 5e-324, 10**400]) | st.floats()
+WORDS = st.sampled_from(["zero_aileron_torque", "table", "taylor", "cubic", "unsteady", "\ud800", "", "/grid/mach"])
+ANYTHING = st.recursive(
+    st.none() | st.booleans() | NUMBERS | WORDS | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=8,
+)
+
+
+def places(document: Any, pointer: str = "") -> Iterator[str]:
+    """Pointers to everything inside a document."""
+    items = (
+        document.items() if isinstance(document, dict) else enumerate(document) if isinstance(document, list) else ()
+    )
+    for key, value in items:
+        yield f"{pointer}/{key}"
+        yield from places(value, f"{pointer}/{key}")
+
+
+def put(document: Any, pointer: str, value: Any) -> None:
+    *parents, last = pointer.split("/")[1:]
+    place = document
+    for part in parents:
+        place = place[int(part) if isinstance(place, list) else part]
+    place[int(last) if isinstance(place, list) else last] = value
+
+
+@st.composite
+def damaged(draw: st.DrawFn) -> tuple[str, Any]:
+    path, example = draw(st.sampled_from(EXAMPLES))
+    document = copy.deepcopy(example)
+    for _ in range(draw(st.integers(1, 3))):
+        pointer = draw(st.sampled_from(sorted(places(example))))
+        with suppress(KeyError, IndexError, TypeError, ValueError):  # already gone with what held it
+            put(document, pointer, draw(NUMBERS | ANYTHING))
+    return path, document
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(body=damaged())
+@pytest.mark.filterwarnings("default")
+def test_random_values_anywhere(client: TestClient, refused: Any, body: tuple[str, Any]) -> None:
+    path, document = body
+    response = client.post(path, content=json.dumps(document), headers=JSON)
+    if response.status_code != 200:
+        problem = refused(response, 422)
+        assert problem["errors"] or problem["code"] == "invalid_request"
