@@ -8,6 +8,8 @@ from scipy.interpolate import CubicSpline
 from model.arrays import FloatArray
 from model.hinge_moments.camber import Bend, MeanLine
 
+#: Points closer together than this part of the chord say nothing about the slope between them.
+CLOSEST = 1e-9
 #: No mean line may have more points.
 MAX_POINTS = 500
 
@@ -46,5 +48,7 @@ def _check(x: FloatArray, z: FloatArray) -> None:
         raise ValueError("points of a mean line must be finite")
     if x[0] != 0.0 or x[-1] != 1.0 or np.any(np.diff(x) <= 0):
         raise ValueError("x must increase from 0 at the leading edge to 1 at the trailing edge")
+    if np.min(np.diff(x)) < CLOSEST:
+        raise ValueError(f"points of a mean line lie too close together: at least {CLOSEST:g} of the chord apart")
     if np.max(np.abs(z)) > 0.5:
         raise ValueError("ordinates are fractions of the chord: none may exceed 0.5")

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
-import pytest
 from fastapi.testclient import TestClient
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -58,7 +57,6 @@ def damaged(draw: st.DrawFn) -> tuple[str, Any]:
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(body=damaged())
-@pytest.mark.filterwarnings("default")
 def test_random_values_anywhere(client: TestClient, refused: Any, body: tuple[str, Any]) -> None:
     path, document = body
     response = client.post(path, content=json.dumps(document), headers=JSON)

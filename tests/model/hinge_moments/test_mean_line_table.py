@@ -59,3 +59,8 @@ def test_the_chord_line_joins_the_ends():
 def test_impossible_lines_are_refused(x, z, message):
     with pytest.raises(ValueError, match=message):
         mean_line_of_points(x, z)
+
+
+def test_points_that_nearly_coincide_are_refused():
+    with pytest.raises(ValueError, match="too close together"):
+        mean_line_of_points(np.array([0.0, 5e-324, 0.5, 1.0]), np.array([0.0, 0.05, 0.02, 0.0]))
