@@ -83,7 +83,7 @@ class Verdict(GridArrays):
         return int(np.argmin(np.where(self.judged, distance, np.inf)))
 
 
-#: The packs of controllers.md 6. Values are numbers to meet, not a claim of compliance with a standard.
+#: Named packs. Values are numbers to meet, not a claim of compliance with a standard.
 SPEC_PACKS: dict[str, tuple[Spec, ...]] = {
     "default": (
         Spec("gain_margin", "min", 6.0, "spec_pack"),

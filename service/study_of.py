@@ -17,7 +17,7 @@ from model.hinge_moments.expansion import Angles
 from model.section import Body, Geometry, Inertia
 from model.trim_request import LARGEST_TRIM_ANGLE, HeldTorque, TrimRequest
 from schedules.study import Controller, GridRequest, PlantStudy, Reference, Study
-from service.schemas import actuators, aerodynamics, controllers, flight, requests, section, weights
+from service.schemas import actuators, aerodynamics, controller_requests, flight, requests, section, weights
 from service.schemas import trim as trims
 from service.source_of import hinge_moment_source, model_refuses
 from service.spec_names import SPEC_FIELDS
@@ -167,21 +167,21 @@ def limits(wire: actuators.Limits) -> ActuatorLimits:
     )
 
 
-def controller(wire: controllers.Controller) -> Controller:
+def controller(wire: controller_requests.Controller) -> Controller:
     """A controller by its kind."""
-    if isinstance(wire, controllers.Lqr):
+    if isinstance(wire, controller_requests.Lqr):
         return LqrController(wire.name, lqr_weights(wire.weights), wire.tab_allocation)
-    cut_off = wire.rate_filter_hz if isinstance(wire, controllers.NegativeFeedback) else None
+    cut_off = wire.rate_filter_hz if isinstance(wire, controller_requests.NegativeFeedback) else None
     return ClassicalController(wire.name, wire.kind, specs(wire.specs), _rad_s(cut_off))
 
 
-def specs(wire: controllers.Specs) -> tuple[Spec, ...]:
+def specs(wire: controller_requests.Specs) -> tuple[Spec, ...]:
     """The specs that were given, each in the unit of its quantity."""
     given = {name: getattr(wire, name) for name in type(wire).model_fields}
     return tuple(SPEC_FIELDS[name].spec(value) for name, value in given.items() if value is not None)
 
 
-def lqr_weights(wire: controllers.Weights) -> BrysonWeights | ExplicitWeights:
+def lqr_weights(wire: controller_requests.Weights) -> BrysonWeights | ExplicitWeights:
     """Weights by their rule; Bryson's angles from degrees to radians."""
     if isinstance(wire, weights.BrysonWeights):
         return BrysonWeights(

@@ -22,8 +22,8 @@ from service.presenters.requirements import reference_document, requirements_doc
 from service.presenters.response import response_document
 from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.designs import DesignId
-from service.schemas.controller import InterpolatedGains, Requirements
-from service.schemas.controller import Response as StepResponse
+from service.schemas.controller_answers import InterpolatedGains, Requirements
+from service.schemas.controller_answers import Response as StepResponse
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere, SettingsHere
 from service.units import unit_of

@@ -17,7 +17,7 @@ from service.presenters.root_locus import root_locus_document
 from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.controllers import ControllerName, Point
 from service.routes.designs import DesignId
-from service.schemas.controller import RootLocus
+from service.schemas.controller_answers import RootLocus
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere, SettingsHere
 

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from service.schemas.actuators import Actuators
 from service.schemas.aerodynamics import Aerodynamics, ThinAerofoil
-from service.schemas.controllers import Classical, Controller
+from service.schemas.controller_requests import Classical, Controller
 from service.schemas.flight import Atmosphere, Grid, Reference, SurfaceAngle
 from service.schemas.section import Geometry, HingeGeometry, Inertia
 from service.schemas.trim import Trim

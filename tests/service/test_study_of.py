@@ -18,7 +18,7 @@ from model.actuators import ActuatorLimits
 from model.system import TabAileron
 from service import study_of
 from service.examples import NAMES, example
-from service.schemas.controllers import Specs
+from service.schemas.controller_requests import Specs
 from service.schemas.flight import Grid
 from service.schemas.requests import DesignRequest
 from service.spec_names import SPEC_FIELDS
