@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import expm
 
-from service.schemas import controller as answers
+from service.schemas import controller_answers as answers
 from service.schemas.point import LinearModels, Point
 
 NAMES = ("nf", "pf", "lqr")
