@@ -108,7 +108,7 @@ def step_response(loop: Loop, reference: FloatArray, duration: float, samples: i
     rows = _rows(loop, step)
     with np.errstate(over="ignore", invalid="ignore"):
         z = _powers_of(transition(generator, duration / (samples - 1)), samples)
-        outputs = z @ rows.swapaxes(-1, -2)
+        outputs = (rows @ z.swapaxes(-1, -2)).swapaxes(-1, -2)  # each signal contiguous in time
     time = np.broadcast_to(np.linspace(0.0, duration, samples), (*grid, samples))
     return Response(
         time=time,

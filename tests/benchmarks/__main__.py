@@ -33,7 +33,7 @@ def main() -> None:
     print(
         f"Python {platform.python_version()}, {versions} ({slycot}), one BLAS thread, {arguments.repeats} pairs a row"
     )
-    print(f"{'job':<42} {'peer':<28} {'ours ms':>9} {'peer ms':>9} {'ratio':>7} {'spread':>15} {'goal':>6}")
+    print(f"{'job':<44} {'peer':<28} {'ours ms':>9} {'peer ms':>9} {'ratio':>7} {'spread':>15} {'goal':>6}")
     for row in rows():
         if arguments.only not in row.job:
             continue
@@ -41,7 +41,7 @@ def main() -> None:
         low, high = done.spread
         verdict = "met" if done.ratio >= row.goal else "MISSED"
         print(
-            f"{row.job:<42} {row.peer:<28} {1e3 * min(done.ours):>9.2f} {1e3 * min(done.theirs):>9.1f} "
+            f"{row.job:<44} {row.peer:<28} {1e3 * min(done.ours):>9.2f} {1e3 * min(done.theirs):>9.1f} "
             f"{done.ratio:>7.1f} {low:>7.1f}..{high:<6.1f} {row.goal:>6g} {verdict}",
             flush=True,
         )

@@ -35,6 +35,7 @@ def rows() -> list[Row]:
         _margins(c),
         _all_margins(c),
         _steps(c),
+        _refined_steps(c),
         _whole(c),
     ]
 
@@ -127,16 +128,22 @@ def _all_margins(c: Case) -> Row:
 
 def _steps(c: Case) -> Row:
     def ours() -> Any:
-        response = step_response(c.loop, np.array([STEP]), DURATION, SAMPLES)
-        return response, response.peaks
-
-    def agree(ours: Any, theirs: Any) -> None:
-        response, peaks = ours
-        np.testing.assert_allclose(np.max(np.abs(response.outputs), axis=-2), theirs, rtol=1e-9, atol=1e-9)
-        assert np.all(peaks >= theirs * (1 - 1e-12))  # refined between the samples, which the peer's are not
+        return np.max(np.abs(step_response(c.loop, np.array([STEP]), DURATION, SAMPLES).outputs), axis=-2)
 
     return Row(
-        "step, 501 samples, 6 outputs, peaks", "ct.forced_response loop", 60.0, ours,
+        "step, 501 samples, 6 outputs, sampled peaks", "ct.forced_response loop", 60.0, ours,
+        lambda: peers.control_steps(c.loop), _close(1e-9),
+    )  # fmt: skip
+
+
+def _refined_steps(c: Case) -> Row:
+    def agree(ours: Any, theirs: Any) -> None:
+        assert np.all(ours >= theirs * (1 - 1e-12))
+        np.testing.assert_allclose(ours, theirs, rtol=2e-2)  # the peer's samples miss up to that much of a peak
+
+    return Row(
+        "step, peaks refined between the samples", "the same, sampled peaks", 30.0,
+        lambda: step_response(c.loop, np.array([STEP]), DURATION, SAMPLES).peaks,
         lambda: peers.control_steps(c.loop), agree,
     )  # fmt: skip
 
