@@ -144,19 +144,20 @@ def _judged(
 ) -> DesignedController:
     """Judge the loop as it is flown, and withdraw every gain that this second look does not bear out."""
     ok = outcomes.ok
-    fastest = _fastest_mode(request, loop, ok)
-    frequency = reduced_frequency(fastest[..., None], plant.grid.condition, study.geometry.chord)[..., 0]
     if not np.any(ok):
-        return DesignedController(request, outcomes, gains, loop, None, fastest, frequency, (), riccati)
+        none = np.full(ok.shape, np.nan)
+        return DesignedController(request, outcomes, gains, loop, None, none.astype(complex), none, (), riccati)
     step, duration = np.array([study.reference.aileron]), horizon(study, request)
     try:
         found = assess(loop.take(ok), step, duration).spread(ok)
+        fastest = _fastest_mode(request, loop, ok)
         checked = _certify(outcomes, found, _asked(request))
-    except np.linalg.LinAlgError:
-        checked = _without_unjudgeable(outcomes, loop, step, duration)
+    except np.linalg.LinAlgError as error:
+        checked = _without_unjudgeable(outcomes, request, loop, step, duration, str(error))
     if not np.array_equal(checked.ok, ok):
         kept = loop.take(checked.ok).spread(checked.ok)
         return _judged(study, plant, request, checked, _kept(gains, checked), kept, riccati)
+    frequency = reduced_frequency(fastest[..., None], plant.grid.condition, study.geometry.chord)[..., 0]
     actuators = {"tab": study.tab_actuator, "aileron": study.aileron_actuator}
     said = verdicts(found, ok, _asked(request), study.spec_pack, actuators)
     return DesignedController(request, outcomes, gains, loop, found, fastest, frequency, said, riccati)
@@ -166,22 +167,27 @@ def _fastest_mode(request: Controller, loop: Loop, ok: BoolArray) -> ComplexArra
     """Fastest closed-loop mode of the surfaces that the air moves (*G,) [rad/s], nan where there is no design."""
     fastest = np.full(ok.shape, complex(np.nan, np.nan))
     surfaces = ("da",) if isinstance(request, ClassicalController) else ("dt", "da")
-    if np.any(ok):
-        fastest[ok] = fastest_surface_mode(loop.closed[ok], loop.states, surfaces)
+    fastest[ok] = fastest_surface_mode(loop.closed[ok], loop.states, surfaces)
     return fastest
 
 
-def _without_unjudgeable(outcomes: Outcomes, loop: Loop, step: FloatArray, duration: float) -> Outcomes:
-    """One point whose numbers LAPACK gives up on must not lose the others: find such points one by one."""
+def _without_unjudgeable(
+    outcomes: Outcomes, request: Controller, loop: Loop, step: FloatArray, duration: float, together: str
+) -> Outcomes:
+    """One point whose numbers LAPACK gives up on must not lose the others: find such points one by one.
+
+    Where each can be judged alone and only all of them `together` cannot, none is known to be right: all are withdrawn.
+    """
     reasons = np.full(outcomes.ok.shape, None, dtype=object)
     for index in map(tuple, np.argwhere(outcomes.ok)):
         try:
             assess(loop.take(index), step, duration)
+            _fastest_mode(request, loop.take(index), np.array(True))
         except np.linalg.LinAlgError as error:
             reasons[index] = str(error)
     failed = np.asarray(reasons != None)  # noqa: E711, elementwise
     if not np.any(failed):
-        raise AssertionError("the grid could not be judged, but each of its points could")
+        failed, reasons = outcomes.ok, np.full(outcomes.ok.shape, together, dtype=object)
     return outcomes.failing(failed, Outcome.NOT_CERTIFIED, lambda index: f"the loop cannot be judged: {reasons[index]}")
 
 

@@ -32,8 +32,10 @@ SMALLEST_RADIUS = 3e-5
 BLOCK = 128
 #: What missing a spec by its whole limit costs, in the logarithm of the bandwidth.
 PRICE = 20.0
-#: Ranks above every candidate that misses a spec.
-_MET = 1e3
+#: Rank of a candidate that meets all specs, above all that miss one (their rank is negative).
+_MET = 1.0
+#: Rank below every candidate that was judged to the end.
+_UNJUDGED = -1e9
 #: Step of the finite differences, in the search's coordinates.
 _STEP = 1e-4
 
@@ -44,32 +46,42 @@ class Infeasibility:
 
     Attributes
     ----------
-    blocking : the specs in the way. One of them when relaxing it alone is enough (the one whose relaxation is the
-        smallest part of its limit); else all that the nearest design misses
-    reachable : for one, the best value of its quantity with all other specs met; for several, their values at the
-        design whose largest miss is least; nan when no stable design comes near
+    blocking : the spec whose relaxation alone is enough and is the smallest part of its limit; None when no single
+        relaxation is enough
+    reachable : best value of its quantity with all other specs met; nan without one
+    missed : the specs that the nearest design misses, the one whose largest miss is least
+    nearest : their values there; nan where no stable design comes near
     """
 
-    blocking: tuple[Spec, ...]
-    reachable: tuple[float, ...]
+    blocking: Spec | None
+    reachable: float
+    missed: tuple[Spec, ...]
+    nearest: tuple[float, ...]
 
     def describe(self) -> str:
-        """One sentence with the numbers, angles in degrees."""
-        asked = [_in_words(spec, spec.limit, bound=True) for spec in self.blocking]
-        if np.any(np.isnan(self.reachable)):
-            return f"no design comes near the specs; in the way: {', '.join(asked)}"
-        got = [_in_words(spec, value) for spec, value in zip(self.blocking, self.reachable, strict=True)]
-        if len(asked) == 1:
-            return f"asked: {asked[0]}; with all other specs met the best reachable is {got[0]}"
-        return f"no single spec is in the way: asked {', '.join(asked)}; the nearest design has {', '.join(got)}"
+        """In words and numbers, angles in degrees."""
+        if self.blocking is None:
+            first = "no single spec is in the way"
+        else:
+            asked, got = _in_words(self.blocking, self.blocking.limit, True), _in_words(self.blocking, self.reachable)
+            first = f"asked: {asked}; with all other specs met the best reachable is {got}"
+        misses = (
+            f"{_in_words(spec, spec.limit, True)} ({'none' if np.isnan(value) else _with_unit(spec, value)})"
+            for spec, value in zip(self.missed, self.nearest, strict=True)
+        )
+        return f"{first}; the nearest design misses {', '.join(misses)}"
 
 
 def _in_words(spec: Spec, value: float, bound: bool = False) -> str:
+    relation = {"min": "at least ", "max": "at most "}[spec.sense] if bound else ""
+    return f"{spec.quantity.replace('_', ' ')} {relation}{_with_unit(spec, value)}"
+
+
+def _with_unit(spec: Spec, value: float) -> str:
     unit = QUANTITIES[spec.quantity]
     if unit == "rad":
         value, unit = float(np.rad2deg(value)), "deg"
-    relation = {"min": "at least ", "max": "at most "}[spec.sense] if bound else ""
-    return f"{spec.quantity.replace('_', ' ')} {relation}{value:.4g}{'' if unit == '1' else ' ' + unit}"
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +151,7 @@ class _Best:
 def _blocking(
     form: NormalForm, horizon: float, specs: tuple[Spec, ...], nearest: _Best, lost: IntArray
 ) -> list[Infeasibility]:
-    """For each point, the one spec to relax or, where one is not enough, all that the nearest design misses."""
+    """For each point, the one spec to relax, where one is enough, and what the nearest design misses."""
     relaxations, reached = [], []
     for spec in specs:
         others = tuple(s for s in specs if s is not spec)
@@ -151,12 +163,17 @@ def _blocking(
     misses = [nearest.judged.miss(spec) for spec in specs]
     found = []
     for i, k in enumerate(order):
-        if np.isfinite(relaxations[k][i]):
-            found.append(Infeasibility((specs[k],), (float(reached[k][i]),)))
-            continue
         missed = [s for s, miss in enumerate(misses) if miss[lost[i]] > 0]
-        values = tuple(float(nearest.judged.values[specs[s].quantity][lost[i]]) for s in missed)
-        found.append(Infeasibility(tuple(specs[s] for s in missed), values))
+        nearest_values = tuple(float(nearest.judged.values[specs[s].quantity][lost[i]]) for s in missed)
+        alone = np.isfinite(relaxations[k][i])
+        found.append(
+            Infeasibility(
+                specs[k] if alone else None,
+                float(reached[k][i]) if alone else np.nan,
+                tuple(specs[s] for s in missed),
+                nearest_values,
+            )
+        )
     return found
 
 
@@ -237,18 +254,16 @@ class _Search:
     def _priced(self, judged: Judged) -> FloatArray:
         """Aim less the price of the miss; candidates never judged come last, best damped first."""
         priced = self._aim(judged) - PRICE * np.maximum(np.max(self._misses(judged), axis=-1, initial=-np.inf), 0.0)
-        last = -_MET + np.nan_to_num(judged.values["damping_ratio"], nan=-1.0)
+        last = _UNJUDGED + np.nan_to_num(judged.values["damping_ratio"], nan=-1.0)
         return np.where(np.isfinite(priced), priced, last)
 
     def _strict(self, judged: Judged) -> FloatArray:
         """Strict rank: candidates that meet all specs by their aim; above all others, which go by their miss."""
         miss = np.max(self._misses(judged), axis=-1, initial=-np.inf)
         aim = self._aim(judged)
-        return np.where(
-            (miss <= 0) & np.isfinite(aim),
-            _MET + np.nan_to_num(aim),
-            np.where(np.isfinite(miss), -miss, -_MET),
-        )
+        # The aim keeps its order between 0 and 1, whatever its size and sign: meeting the specs is what ranks first.
+        ordered = 0.5 + np.arctan(np.nan_to_num(aim)) / np.pi
+        return np.where((miss <= 0) & np.isfinite(aim), _MET + ordered, np.where(np.isfinite(miss), -miss, -np.inf))
 
     def _constraints(self, at: IntArray, u: FloatArray, judged: Judged) -> FloatArray:
         """(K, M) misses of the specs, damping mode by mode: at most 0 when met."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from model.actuators import Actuator
 from model.arrays import FloatArray, GridArrays
-from model.polynomial_product import times as times
+from model.polynomial_product import times
 from model.servo_tab import ServoTab
 
 

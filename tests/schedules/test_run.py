@@ -148,3 +148,20 @@ def test_the_same_study_gives_the_same_numbers(wind_tunnel_study, wind_tunnel_en
     for one, other in zip(wind_tunnel_envelope.controllers, again.controllers, strict=True):
         for g, h in zip(one.gains, other.gains, strict=True):
             np.testing.assert_array_equal(g.values, h.values)
+
+
+def test_points_that_only_fail_together_are_all_withdrawn(wind_tunnel_study, monkeypatch):
+    import schedules.run as room
+
+    real = room.assess
+
+    def fails_in_company(loop, *arguments):
+        if loop.A.ndim > 2:
+            raise np.linalg.LinAlgError("Eigenvalues did not converge")
+        return real(loop, *arguments)
+
+    monkeypatch.setattr(room, "assess", fails_in_company)
+    controller = run(replace(wind_tunnel_study, controllers=wind_tunnel_study.controllers[2:])).controllers[0]
+    assert np.all(controller.outcomes.codes == Outcome.NOT_CERTIFIED)
+    assert all(np.isnan(g.values).all() for g in controller.gains)
+    assert np.isnan(controller.reduced_frequency).all()

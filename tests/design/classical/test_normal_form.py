@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from design.classical.normal_form import NormalForm, times
+from design.classical.normal_form import NormalForm
 from design.classical.synthesis import ClassicalController, gain_values
 from design.classical.tab_loop import tab_loop
 from design.gains import Gain
+from model.polynomial_product import times
 
 CONTROLLERS = {
     "nf": ClassicalController("nf", "negative_feedback", rate_filter=600.0),
