@@ -139,13 +139,15 @@ class CandidateJudge:
     ----------
     form : normal form, G = (P,)
     horizon : how long step responses are followed [s]
+    fineness : how many times as many samples, in frequency and in time
     """
 
-    def __init__(self, form: NormalForm, horizon: float) -> None:
+    def __init__(self, form: NormalForm, horizon: float, fineness: int = 1) -> None:
         self.form = form
+        self.fineness = fineness
         self.horizon = horizon * form.frequency  # in units of 1 / omega_n
         top = 30.0 * np.maximum(form.servo_ratio, 1.0)
-        self.x = np.exp(np.linspace(np.log(0.01), np.log(top), FREQUENCIES, axis=-1))  # (P, W)
+        self.x = np.exp(np.linspace(np.log(0.01), np.log(top), FREQUENCIES * fineness, axis=-1))  # (P, W)
         powers = (1j * self.x)[..., None] ** np.arange(form.denominator.shape[-1] - 1, -1, -1)
         d = np.einsum("pwk,pk->pw", powers, form.denominator)
         self.terms: ComplexArray = np.einsum("pwk,pjk->pjw", powers, form.numerators) / d[:, None, :]
@@ -158,8 +160,9 @@ class CandidateJudge:
         names = ("damping_ratio", "gain_margin", "phase_margin", "settling_time", "overshoot")
         values = {name: np.full(at.shape, np.nan) for name in names}
         judged = Judged(values, np.full(at.shape, np.nan))
-        for start in range(0, at.size, CHUNK):
-            part = slice(start, start + CHUNK)
+        chunk = CHUNK // self.fineness
+        for start in range(0, at.size, chunk):
+            part = slice(start, start + chunk)
             self._judge_part(judged, np.arange(at.size)[part], at[part], kappa[part], specs)
         return judged
 
@@ -216,7 +219,7 @@ class CandidateJudge:
         residues = np.einsum("kn,krn->kr", numerator, powers) / np.where(slope == 0, np.inf, slope)
         slowest = np.min(-roots.real, axis=-1)
         length = np.minimum(self.horizon[at], DECAYED / slowest)
-        error = _Error(roots, residues, length / TIMES)
+        error = _Error(roots, residues, length, TIMES * self.fineness)
         return error.peak(), error.settling() / self.form.frequency[at]
 
 
@@ -240,10 +243,11 @@ def _roots(polynomial: FloatArray) -> ComplexArray:
 class _Error:
     """``y - 1`` of K unit steps, a sum of modes: sampled, and exact wherever an event is refined."""
 
-    def __init__(self, roots: ComplexArray, residues: ComplexArray, dt: FloatArray) -> None:
-        self.roots, self.residues, self.dt = roots, residues, dt
+    def __init__(self, roots: ComplexArray, residues: ComplexArray, length: FloatArray, times: int) -> None:
+        self.roots, self.residues, self.dt = roots, residues, length / times
+        dt = self.dt
         ratio = np.exp(roots * dt[:, None])
-        modes = np.cumprod(np.broadcast_to(ratio[..., None], (*ratio.shape, TIMES)), axis=-1)
+        modes = np.cumprod(np.broadcast_to(ratio[..., None], (*ratio.shape, times)), axis=-1)
         later = np.einsum("kr,krt->kt", residues, modes).real
         self.samples = np.concatenate([np.full((dt.size, 1), -1.0), later], axis=-1)
 

@@ -28,6 +28,8 @@ STARTS = 3
 ITERATIONS = 40
 #: A search whose trust region has shrunk to this, in its coordinates, has arrived.
 SMALLEST_RADIUS = 3e-5
+#: Resolution of the closer look at the winners, and of the search where it finds them flattered.
+FINER = 8
 #: Points searched together; bounds the memory.
 BLOCK = 128
 #: What missing a spec by its whole limit costs, in the logarithm of the bandwidth.
@@ -130,6 +132,12 @@ def search_gains(form: NormalForm, specs: tuple[Spec, ...], horizon: float) -> F
 def _search_block(form: NormalForm, specs: tuple[Spec, ...], horizon: float) -> Found:
     with np.errstate(over="ignore", divide="ignore", invalid="ignore", under="ignore"):
         best = _Search(form, horizon, specs, None).run()
+        # A resonance between the samples flatters a candidate: look closer at what won, and search there again.
+        flattered = np.flatnonzero((best.merit >= _MET) & _missed_closely(form, horizon, specs, best.kappa))
+        if flattered.size:
+            again = _Search(form.take(flattered), horizon, specs, None, FINER).run()
+            best.kappa[flattered], best.merit[flattered] = again.kappa, again.merit
+            best.judged.put(flattered, again.judged)
         feasible = best.merit >= _MET
         infeasibility: list[Infeasibility | None] = [None] * feasible.size
         if not np.all(feasible):
@@ -137,6 +145,15 @@ def _search_block(form: NormalForm, specs: tuple[Spec, ...], horizon: float) -> 
             for point, found in zip(lost, _blocking(form.take(lost), horizon, specs, best, lost), strict=True):
                 infeasibility[point] = found
     return Found(best.kappa, feasible, tuple(infeasibility))
+
+
+def _missed_closely(form: NormalForm, horizon: float, specs: tuple[Spec, ...], kappa: FloatArray) -> BoolArray:
+    """Mask (P,) of the candidates that miss a spec when they are judged at the finer resolution."""
+    judged = CandidateJudge(form, horizon, FINER).judge(np.arange(form.frequency.size), kappa, specs)
+    missed = np.zeros(form.frequency.size, dtype=bool)
+    for spec in specs:
+        missed |= judged.miss(spec) > 0
+    return missed
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,8 +197,10 @@ def _blocking(
 class _Search:
     """One search: the specs to meet, and what is made best (the bandwidth, or one quantity)."""
 
-    def __init__(self, form: NormalForm, horizon: float, specs: tuple[Spec, ...], aim: Spec | None) -> None:
-        self.judge = CandidateJudge(form, horizon)
+    def __init__(
+        self, form: NormalForm, horizon: float, specs: tuple[Spec, ...], aim: Spec | None, fineness: int = 1
+    ) -> None:
+        self.judge = CandidateJudge(form, horizon, fineness)
         self.specs = tuple(_in_hand(s) for s in specs)
         self.steering = self.specs if aim is None else (*self.specs, _always(aim))
         self.aim = aim

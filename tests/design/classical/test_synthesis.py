@@ -182,3 +182,19 @@ def test_a_spec_missed_ten_thousand_times_over_is_still_the_one_that_blocks(plan
     reason = str(outcomes.reasons)
     assert reason.startswith("asked: settling time at most 1e-05 s")
     assert 0.05 < float(reason.split("best reachable is settling time ")[1].split(" s")[0]) < 0.3
+
+
+@pytest.mark.parametrize("cutoff_hz", [100.0, 300.0])
+def test_a_resonance_between_the_samples_flatters_nobody(unsteady_a, tab_actuator, cutoff_hz):
+    """A slow servo and no damping asked for: lightly damped modes ring on between the search's samples."""
+    from dataclasses import replace
+
+    specs = (Spec("gain_margin", "min", 4.0), Spec("settling_time", "max", 0.4), Spec("overshoot", "max", 0.02))
+    controller = ClassicalController("nf", "negative_feedback", specs, 2.0 * np.pi * cutoff_hz)
+    actuator = replace(tab_actuator, servo_bandwidth=2.0 * np.pi * 5.0)
+    ok = Outcomes.all_ok(unsteady_a.grid.shape)
+    gains, outcomes = design_classical(unsteady_a.servo, actuator, controller, 1.0, ok)
+    assert outcomes.ok.all()
+    _, exact = _exact(unsteady_a, actuator, controller, gain_values(gains))
+    for spec in specs:
+        assert np.all(spec.met(achieved(exact, spec.quantity))), spec
