@@ -4,16 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from design.delay.damping import least_damping_ratio_delayed
+from design.delay.delayed_poles import delayed_poles
+from design.delay.step_response import delayed_step_response
+from design.delay.with_pade import without_delay
+from design.disturbance.noise_gain import noise_gain
 from design.frequency.margins import Margins, margins
-from design.frequency.poles import least_damping_ratio, poles
+from design.frequency.poles import largest_real_part, least_damping_ratio, poles
+from design.frequency.sampled import sampled_margins, sampled_poles
+from design.frequency.sampled_loop import SampledLoop
 from design.loop import Loop
 from design.response.demand import ActuatorDemand, actuator_demands
 from design.response.step_metrics import StepMetrics, step_metrics
-from design.response.step_response import step_response
-from design.specs import SPEC_PACKS, Spec, Verdict
+from design.sampling import Sampling, as_if_continuous, digital_loop
+from design.specs import Spec, Verdict
 from model.actuators import Actuator
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays
 
@@ -22,40 +30,86 @@ from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays
 class Assessment(GridArrays):
     """Figures of a loop over the grid.
 
+    Of a digital controller poles and margins are those of the loop from sample to sample, exact; step and demand are
+    those of the continuous loop that lags as much (`design.sampling.as_if_continuous`).
+
     Attributes
     ----------
-    poles : (*G, n) closed-loop poles [rad/s]
+    poles : (*G, n) closed-loop poles [rad/s]; with a delay the rightmost ones, nan padded; sampled ``ln z / T``
+    damping_ratio : (*G,) smallest of their damping ratios; with a delay as `design.delay.damping` has it
+    largest_real_part : (*G,) of all closed-loop poles [1/s]; nan where a delay leaves it unproved
     margins : one for each actuator input at which the loop is cut, the other inputs closed
     step : the aileron's response to the reference step
     demand : one for each actuator of the loop
     actuators : names of cuts and actuators, in that order
+    loop : what was judged
     """
 
     poles: ComplexArray
+    damping_ratio: FloatArray
+    largest_real_part: FloatArray
     margins: tuple[Margins, ...]
     step: StepMetrics
     demand: tuple[ActuatorDemand, ...]
     actuators: tuple[str, ...]
+    loop: Loop
+
+    @cached_property
+    def noise_gain(self) -> FloatArray | None:
+        """Largest gain from noise on the aileron's angle to the commanded tab deflection (`design.disturbance`)."""
+        return noise_gain(self.loop)
 
 
-def assess(loop: Loop, reference: FloatArray, duration: float, samples: int = 501) -> Assessment:
+def assess(
+    loop: Loop, reference: FloatArray, duration: float, samples: int = 501, sampling: Sampling | None = None
+) -> Assessment:
     """Judge a loop whose matrices are finite at every point.
 
     Parameters
     ----------
     loop : over any grid (`Loop.take` the points that carry gains)
     reference : (p,) sizes of the step in each reference [rad]
-    duration : how long the step is followed [s]
+    duration : how long the step is followed [s], longer than any delay
     samples : samples of the step; peaks and times are refined between them
+    sampling : how its controller runs on a computer; None is a continuous one
     """
-    response = step_response(loop, reference, duration, samples)
+    flown = as_if_continuous(loop, sampling)
+    response, chained = delayed_step_response(flown, reference, duration, samples), without_delay(flown)
+    digital = None if sampling is None else digital_loop(loop, sampling)
+    found, damping, growth = _poles(loop) if digital is None else _sampled_poles(digital)
     return Assessment(
-        poles=poles(loop.closed),
-        margins=_margins_of_cuts(loop),
-        step=step_metrics(loop, response, "da", reference),
-        demand=actuator_demands(loop, response, loop.inputs),
+        poles=found,
+        damping_ratio=damping,
+        largest_real_part=growth,
+        margins=_margins_of_cuts(loop) if digital is None else _margins_of_sampled_cuts(digital),
+        step=step_metrics(chained, response, "da", reference),
+        demand=actuator_demands(chained, response, loop.inputs),
         actuators=loop.inputs,
+        loop=flown,
     )
+
+
+def _poles(loop: Loop) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Poles, least damping ratio and largest real part."""
+    if not any(loop.delay):
+        found = poles(loop.closed)
+        return found, least_damping_ratio(found), largest_real_part(found)
+    delayed = delayed_poles(loop)
+    growth = np.max(np.where(np.isnan(delayed.poles), -np.inf, delayed.poles.real), axis=-1)
+    growth = np.where(delayed.complete_beyond < 0.0, growth, np.nan)
+    return delayed.poles, least_damping_ratio_delayed(loop), growth
+
+
+def _sampled_poles(loop: SampledLoop) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Poles, least damping ratio and largest real part; of modes that are over after some samples, none."""
+    found = sampled_poles(loop.closed, loop.sample_time)
+    lasting = np.where(np.isfinite(found.equivalent), found.equivalent, complex(np.nan, np.nan))
+    return lasting, np.min(found.damping_ratio, axis=-1), np.max(found.equivalent.real, axis=-1)
+
+
+def _margins_of_sampled_cuts(loop: SampledLoop) -> tuple[Margins, ...]:
+    stacked = sampled_margins(loop.cuts())
+    return tuple(stacked.take(i) for i in range(len(loop.inputs)))
 
 
 def _margins_of_cuts(loop: Loop) -> tuple[Margins, ...]:
@@ -77,12 +131,16 @@ def achieved(assessment: Assessment, quantity: str) -> FloatArray | None:
         "phase_margin": lambda: np.min([m.phase_margin for m in cuts], axis=0),
         "disk_margin": lambda: np.min([m.disk_margin for m in cuts], axis=0),
         "sensitivity_peak": lambda: np.max([m.sensitivity_peak for m in cuts], axis=0),
-        "damping_ratio": lambda: least_damping_ratio(assessment.poles),
+        "delay_margin": lambda: np.min([m.delay_margin for m in cuts], axis=0),
+        "bandwidth": lambda: assessment.step.bandwidth,
+        "damping_ratio": lambda: assessment.damping_ratio,
         "settling_time": lambda: assessment.step.settling_time,
         "overshoot": lambda: assessment.step.overshoot,
     }
     if quantity in worst:
         return np.asarray(worst[quantity]())
+    if quantity == "noise_gain":
+        return assessment.noise_gain
     actuator, what = quantity.split("_", 1)
     if actuator not in assessment.actuators:
         return None
@@ -105,7 +163,7 @@ def verdicts(
     assessment: Assessment,
     judged: BoolArray,
     asked: tuple[Spec, ...],
-    pack: str,
+    pack: tuple[Spec, ...],
     actuators: dict[str, Actuator],
 ) -> tuple[Verdict, ...]:
     """Verdict on each spec asked for, of the pack and of the actuators' limits, over the grid.
@@ -114,9 +172,11 @@ def verdicts(
     ----------
     assessment : over the whole grid, nan where a point carries no design
     judged : (*G,) mask of the points that carry one
+    asked, pack : specs of the request and of the pack
+    actuators : by name; their limits are specs too
     """
     found = []
-    for spec in (*asked, *SPEC_PACKS[pack], *limit_specs(actuators)):
+    for spec in (*asked, *pack, *limit_specs(actuators)):
         values = achieved(assessment, spec.quantity)
         if values is not None:
             found.append(Verdict(spec, np.where(judged, values, np.nan), judged, judged & spec.met(values)))

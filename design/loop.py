@@ -2,15 +2,16 @@
 
 ::
 
-        r --> [ N ] --+
-                      v
-                 u = N r - K x  -->  x' = A x + B u + E r  -->  y = C x + F x' + D u + y0
+        r --> [ N ] ----------+   w (torque disturbances, sensor noise)
+                              v   |
+                 u = N r - K x + M w  -->  x' = A x + B v + E r + G w  -->  y = C x + F x' + D v + H v' + y0
                       ^                       |
-                      +------- [ -K ] <-------+
+                      +------- [ -K ] <-------+         v(t) = u(t - delay)
 
 States are the plant's (``dt dt_rate da da_rate``), then integrals (``int_a``), then the states of
 actuators and filters: all of what is flown. Inputs are the commands of the actuators (``tab``,
 ``aileron``), references the wanted angles (``r_a``). Angles [rad], TE-up positive, deviations from trim.
+The closed-loop matrices below leave the delay out; `design.delay` has what is exact with it.
 """
 
 from __future__ import annotations
@@ -61,11 +62,14 @@ class Loop(GridArrays):
 
     Attributes
     ----------
-    A (*G, n, n), B (*G, n, m), E (*G, n, p) : ``x' = A x + B u + E r``
-    K (*G, m, n), N (*G, m, p) : ``u = -K x + N r``
-    C (*G, o, n), F (*G, o, n), D (*G, o, m), offset (*G, o) : ``y = C x + F x' + D u + offset``;
-        `offset` holds the trim values (trim torques), so outputs are totals, not deviations
+    A (*G, n, n), B (*G, n, m), E (*G, n, p), G (*G, n, q) : ``x' = A x + B v + E r + G w``
+    K (*G, m, n), N (*G, m, p), M (*G, m, q) : ``u = -K x + N r + M w``, v being u after its delay
+    C (*G, o, n), F (*G, o, n), D (*G, o, m), H (*G, o, m), offset (*G, o) :
+        ``y = C x + F x' + D v + H v' + offset``; `offset` holds the trim values (trim torques), so outputs are
+        totals, not deviations
     states, inputs, references, outputs : names, one per row or column
+    disturbances : names of w: ``T_a_disturbance``, ``T_t_disturbance`` [N m], and noise on what is measured, by the
+        name of the state: ``da_noise``, ``dt_noise`` [rad], ``da_rate_noise``, ``dt_rate_noise`` [rad/s]
     stages : the loops in the order in which they are closed, for root loci
     delay : transport delay of each input [s]
     """
@@ -73,16 +77,20 @@ class Loop(GridArrays):
     A: FloatArray
     B: FloatArray
     E: FloatArray
+    G: FloatArray
     K: FloatArray
     N: FloatArray
+    M: FloatArray
     C: FloatArray
     F: FloatArray
     D: FloatArray
+    H: FloatArray
     offset: FloatArray
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     references: tuple[str, ...]
     outputs: tuple[str, ...]
+    disturbances: tuple[str, ...]
     stages: tuple[SisoLoop, ...]
     delay: tuple[float, ...]
 
@@ -98,13 +106,23 @@ class Loop(GridArrays):
 
     @cached_property
     def closed_outputs(self) -> FloatArray:
-        """(*G, o, n): outputs from states with the loop closed, ``C + F Acl - D K``."""
-        return self.C + self.F @ self.closed - self.D @ self.K
+        """(*G, o, n): outputs from states with the loop closed, ``C + (F - H K) Acl - D K``."""
+        return self.C + self._of_rates @ self.closed - self.D @ self.K
 
     @cached_property
     def reference_feedthrough(self) -> FloatArray:
-        """(*G, o, p): outputs from the reference with the loop closed, ``F (E + B N) + D N``."""
-        return self.F @ self.reference_input + self.D @ self.N
+        """(*G, o, p): outputs from a resting reference with the loop closed, ``(F - H K) (E + B N) + D N``."""
+        return self._of_rates @ self.reference_input + self.D @ self.N
+
+    @cached_property
+    def disturbance_input(self) -> FloatArray:
+        """``G + B M`` (*G, n, q): how disturbances and noise drive the closed loop."""
+        return self.G + self.B @ self.M
+
+    @cached_property
+    def _of_rates(self) -> FloatArray:
+        """What outputs take of x': their own part, and that of v' = -K x'."""
+        return self.F - self.H @ self.K
 
     def cut(self, name: str) -> SisoLoop:
         """The loop opened at one actuator input, the others closed: where margins are taken."""

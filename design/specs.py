@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
-from model.arrays import BoolArray, FloatArray, GridArrays
+from model.arrays import BoolArray, FloatArray, Floats, GridArrays
 
 Sense = Literal["min", "max"]
 
-#: What can be specified, and the unit it is kept in. Margins of several cuts mean the smallest of them.
+#: What can be specified, and the unit it is kept in. Margins of several cuts mean the smallest of them. `gain_margin`
+#: is the smaller of the two, raising and lowering; `noise_gain` the largest gain over all frequencies from noise on the
+#: measured aileron angle to the commanded tab deflection; actuator quantities are peaks of totals after the
+#: reference step.
 QUANTITIES: dict[str, str] = {
     "damping_ratio": "1",
     "settling_time": "s",
     "overshoot": "1",
+    "bandwidth": "rad/s",
     "gain_margin": "dB",
     "phase_margin": "rad",
+    "delay_margin": "s",
     "disk_margin": "1",
     "sensitivity_peak": "1",
+    "noise_gain": "1",
     "tab_deflection": "rad",
     "tab_rate": "rad/s",
     "tab_torque": "N m",
@@ -35,18 +41,35 @@ QUANTITIES: dict[str, str] = {
 class Spec:
     """One specification: a quantity of `QUANTITIES`, its limit in that unit, and which way it binds.
 
-    `source` says who asked: the request's ``specs``, the named ``spec_pack``, or the actuator ``limits``.
-    Only the request's specs steer a synthesis; the others are judged and reported.
+    The limit is one number, or varies over the grid, (*G,). `source` says who asked: the request's ``specs``, the
+    named ``spec_pack``, or the actuator ``limits``. Only the request's specs steer a synthesis; the others are
+    judged and reported.
     """
 
     quantity: str
     sense: Sense
-    limit: float
+    limit: Floats
     source: Literal["request", "spec_pack", "limits"] = "request"
+
+    @property
+    def scale(self) -> Floats:
+        """What a distance from the limit is a part of: the limit's size, or 1 where it is zero."""
+        size = np.abs(self.limit)
+        return np.where(size > 0.0, size, 1.0) if isinstance(size, np.ndarray) else float(size or 1.0)
+
+    def take(self, index: Any) -> Spec:
+        """The same spec at some points of its grid."""
+        if not isinstance(self.limit, np.ndarray):
+            return self
+        return replace(self, limit=np.asarray(self.limit[index], dtype=float))
+
+    def tightened(self, part: Floats) -> Spec:
+        """The same spec asked for more strictly, by a part of its limit; by a negative part, less."""
+        return replace(self, limit=self.limit + (part if self.sense == "min" else -part) * np.abs(self.limit))
 
     def met(self, values: FloatArray, tolerance: float = 1e-9) -> BoolArray:
         """Mask of the values that meet the limit; a value that does not exist (nan) does not."""
-        slack = tolerance * max(1.0, abs(self.limit))
+        slack = tolerance * np.maximum(1.0, np.abs(self.limit))
         with np.errstate(invalid="ignore"):
             if self.sense == "min":
                 return np.asarray(values >= self.limit - slack)
@@ -75,12 +98,20 @@ class Verdict(GridArrays):
     passed: BoolArray
 
     @property
+    def distance(self) -> FloatArray:
+        """How far inside its limit each value is (*G,), negative outside; nan where there is no value."""
+        return self.spec.distance(self.values)
+
+    @property
     def worst(self) -> int | None:
-        """Flat index of the worst judged point (a missing value is worst of all); None when there is none."""
+        """Flat index of the worst judged point (a missing value is worst of all); None when there is none.
+
+        The worst is the least inside its limit, or the farthest outside, as a part of the limit.
+        """
         if not np.any(self.judged):
             return None
-        distance = np.where(np.isnan(self.values), -np.inf, self.spec.distance(self.values))
-        return int(np.argmin(np.where(self.judged, distance, np.inf)))
+        part = np.where(np.isnan(self.values), -np.inf, self.distance / self.spec.scale)
+        return int(np.argmin(np.where(self.judged, part, np.inf)))
 
 
 #: Named packs. Values are numbers to meet, not a claim of compliance with a standard.

@@ -2,88 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from design.assess import Assessment, achieved, assess, verdicts
-from design.classical.synthesis import ClassicalController, design_classical, gain_values
+from design.classical.controller import ClassicalController
+from design.classical.steering import StepReference
+from design.classical.synthesis import (
+    ClassicalDesign,
+    DesignMargins,
+    design_classical,
+    design_margin_sweep,
+    gain_values,
+)
 from design.classical.tab_loop import tab_loop
-from design.frequency.fastest_mode import fastest_surface_mode
-from design.frequency.poles import largest_real_part
 from design.gains import Gain
 from design.loop import Loop
-from design.lqr.synthesis import LqrController, LqrDesign, design_lqr
+from design.lqr.synthesis import LqrController, design_lqr
 from design.lqr.torque_loop import lqr_loop
 from design.lqr.weights import WeightsRefused
-from design.outcome import Outcome, Outcomes
-from design.specs import Spec, Verdict
-from model.arrays import BoolArray, ComplexArray, FloatArray
-from model.reduced_frequency import QUASI_STEADY_LIMIT, reduced_frequency
-from schedules.analysis import EnvelopeWarning, PlantEnvelope, analyse
+from design.outcome import Outcomes
+from schedules.analysis import PlantEnvelope, analyse
+from schedules.designed import ControllerRefused, DesignedController, DesignedEnvelope
+from schedules.envelope_warnings import envelope_warnings
+from schedules.judging import figures_at, horizon, judged
+from schedules.second_try import TRIES, missed_a_little
+from schedules.smoothing import smooth
 from schedules.study import Controller, Study
-
-
-@dataclass(frozen=True, eq=False)
-class DesignedController:
-    """One controller over the grid: gains with their outcomes, the loop that is flown, and what is said of it.
-
-    Attributes
-    ----------
-    request : what was asked for
-    outcomes : (*G,)
-    gains : each (*G,), nan where the outcome is not ok
-    loop : over the whole grid, nan where the outcome is not ok
-    assessment : over the whole grid, nan where the outcome is not ok; None when no point is
-    fastest_mode : (*G,) fastest closed-loop mode of the surfaces that the air moves (`design.frequency.fastest_mode`)
-        [rad/s]: both of them with state feedback, the aileron where the tab's position is imposed; nan where the
-        outcome is not ok
-    reduced_frequency : (*G,) k of that mode [-]
-    verdicts : one per spec
-    riccati : solution and certificate of the LQR; None for classical controllers
-    """
-
-    request: Controller
-    outcomes: Outcomes
-    gains: tuple[Gain, ...]
-    loop: Loop
-    assessment: Assessment | None
-    fastest_mode: ComplexArray
-    reduced_frequency: FloatArray
-    verdicts: tuple[Verdict, ...]
-    riccati: LqrDesign | None
-
-
-@dataclass(frozen=True, eq=False)
-class DesignedEnvelope:
-    """A study, its plant and its controllers, over the grid."""
-
-    study: Study
-    plant: PlantEnvelope
-    controllers: tuple[DesignedController, ...]
-    warnings: tuple[EnvelopeWarning, ...]
-
-    def controller(self, name: str) -> DesignedController:
-        """The controller of this name; KeyError when there is none."""
-        for controller in self.controllers:
-            if controller.request.name == name:
-                return controller
-        raise KeyError(name)
-
-
-class ControllerRefused(ValueError):
-    """A controller that cannot work at any point of the grid.
-
-    Attributes
-    ----------
-    controller : its name
-    refused : what its weights lack
-    """
-
-    def __init__(self, controller: str, refused: WeightsRefused) -> None:
-        super().__init__(f"controller {controller}: {refused}")
-        self.controller = controller
-        self.refused = refused
 
 
 def run(study: Study) -> DesignedEnvelope:
@@ -95,129 +40,82 @@ def run(study: Study) -> DesignedEnvelope:
     ControllerRefused : weights that cannot work at any point
     """
     plant = analyse(study)
-    controllers = tuple(_design(study, plant, request) for request in study.controllers)
-    warnings = plant.warnings + _trim_warnings(study, plant) + _frequency_warnings(study, controllers)
-    return DesignedEnvelope(study, plant, controllers, warnings)
+    controllers = tuple(design(study, plant, request) for request in study.controllers)
+    return DesignedEnvelope(study, plant, controllers, plant.warnings + envelope_warnings(study, plant, controllers))
 
 
-def horizon(study: Study, request: Controller) -> float:
-    """How long a controller's step is followed [s]: the reference's duration, or longer where a spec needs it."""
-    limits = [spec.limit for spec in _asked(request) if spec.quantity == "settling_time"]
-    return max([study.reference.duration, *(1.25 * limit for limit in limits)])
+def design(study: Study, plant: PlantEnvelope, request: Controller) -> DesignedController:
+    """Design and judge one controller over the plant of a study, be it one of the study's own or not.
 
-
-def _asked(request: Controller) -> tuple[Spec, ...]:
-    return request.specs if isinstance(request, ClassicalController) else ()
-
-
-def _design(study: Study, plant: PlantEnvelope, request: Controller) -> DesignedController:
+    Raises
+    ------
+    ControllerRefused : weights that cannot work at any point
+    """
     if isinstance(request, ClassicalController):
         return _classical(study, plant, request)
     return _lqr(study, plant, request)
 
 
+def design_margins(study: Study, plant: PlantEnvelope, request: ClassicalController) -> DesignMargins:
+    """By how much all specs of a classical controller could be stricter, at every point of the study's plant.
+
+    Raises
+    ------
+    ValueError : there are no specs, or all gains are given
+    """
+    reference = _reference(study, plant, request)
+    return design_margin_sweep(plant.servo_tab, study.tab_actuator, request, reference, plant.outcomes)
+
+
 def _classical(study: Study, plant: PlantEnvelope, request: ClassicalController) -> DesignedController:
-    gains, outcomes = design_classical(
-        plant.servo_tab, study.tab_actuator, request, horizon(study, request), plant.outcomes
-    )
+    found, designed = _chosen(study, plant, request)
+    if request.smoothness > 0.0 and not request.all_gains_given:
+        smoothed = smooth(study, plant, designed)
+        designed = replace(_flown(study, plant, request, designed.outcomes, smoothed.gains), smoothed=smoothed)
+    return replace(designed, infeasibility=found.infeasibility)
+
+
+def _chosen(
+    study: Study, plant: PlantEnvelope, request: ClassicalController
+) -> tuple[ClassicalDesign, DesignedController]:
+    """Gains by the specs, judged; where they just miss a spec (`schedules.second_try`) they are asked for again."""
+    reference, asked = _reference(study, plant, request), request
+    tightened = np.zeros((len(request.specs), *plant.grid.shape))
+    for _ in range(TRIES):
+        found = design_classical(plant.servo_tab, study.tab_actuator, asked, reference, plant.outcomes)
+        designed = _flown(study, plant, request, found.outcomes, found.gains)
+        missed = found.outcomes.ok & ~designed.outcomes.ok
+        if not np.any(missed) or request.all_gains_given:
+            break
+        loop = tab_loop(plant.model, plant.servo_tab, study.tab_actuator, request, gain_values(found.gains))
+        figures = figures_at(study, request, loop, missed)
+        if figures is None or not np.any(more := missed_a_little(request.specs, figures, missed)):
+            break
+        tightened += more
+        specs = tuple(spec.tightened(part) for spec, part in zip(request.specs, tightened, strict=True))
+        asked = replace(request, specs=specs)
+    return found, designed
+
+
+def _reference(study: Study, plant: PlantEnvelope, request: ClassicalController) -> StepReference:
+    return StepReference(study.reference.aileron, horizon(study, request), plant.trim.state[..., 0])
+
+
+def _flown(
+    study: Study, plant: PlantEnvelope, request: ClassicalController, outcomes: Outcomes, gains: tuple[Gain, ...]
+) -> DesignedController:
+    """The loop of a classical controller with these gains, judged."""
     loop = tab_loop(plant.model, plant.servo_tab, study.tab_actuator, request, gain_values(gains))
-    return _judged(study, plant, request, outcomes, gains, loop, None)
+    return judged(study, plant, request, outcomes, gains, loop, None)
 
 
 def _lqr(study: Study, plant: PlantEnvelope, request: LqrController) -> DesignedController:
     try:
-        design = design_lqr(plant.model, request, plant.outcomes)
+        found = design_lqr(plant.model, request, plant.outcomes)
     except WeightsRefused as refused:
         raise ControllerRefused(request.name, refused) from refused
-    loop = lqr_loop(plant.model, design)
-    return _judged(study, plant, request, design.outcomes, _matrix_gains(loop, plant.model.inputs), loop, design)
-
-
-def _judged(
-    study: Study,
-    plant: PlantEnvelope,
-    request: Controller,
-    outcomes: Outcomes,
-    gains: tuple[Gain, ...],
-    loop: Loop,
-    riccati: LqrDesign | None,
-) -> DesignedController:
-    """Judge the loop as it is flown, and withdraw every gain that this second look does not bear out."""
-    ok = outcomes.ok
-    if not np.any(ok):
-        none = np.full(ok.shape, np.nan)
-        return DesignedController(request, outcomes, gains, loop, None, none.astype(complex), none, (), riccati)
-    step, duration = np.array([study.reference.aileron]), horizon(study, request)
-    try:
-        found = assess(loop.take(ok), step, duration).spread(ok)
-        fastest = _fastest_mode(request, loop, ok)
-        checked = _certify(outcomes, found, _asked(request))
-    except np.linalg.LinAlgError as error:
-        checked = _without_unjudgeable(outcomes, request, loop, step, duration, str(error))
-    if not np.array_equal(checked.ok, ok):
-        kept = loop.take(checked.ok).spread(checked.ok)
-        return _judged(study, plant, request, checked, _kept(gains, checked), kept, riccati)
-    frequency = reduced_frequency(fastest[..., None], plant.grid.condition, study.geometry.chord)[..., 0]
-    actuators = {"tab": study.tab_actuator, "aileron": study.aileron_actuator}
-    said = verdicts(found, ok, _asked(request), study.spec_pack, actuators)
-    return DesignedController(request, outcomes, gains, loop, found, fastest, frequency, said, riccati)
-
-
-def _fastest_mode(request: Controller, loop: Loop, ok: BoolArray) -> ComplexArray:
-    """Fastest closed-loop mode of the surfaces that the air moves (*G,) [rad/s], nan where there is no design."""
-    fastest = np.full(ok.shape, complex(np.nan, np.nan))
-    surfaces = ("da",) if isinstance(request, ClassicalController) else ("dt", "da")
-    fastest[ok] = fastest_surface_mode(loop.closed[ok], loop.states, surfaces)
-    return fastest
-
-
-def _without_unjudgeable(
-    outcomes: Outcomes, request: Controller, loop: Loop, step: FloatArray, duration: float, together: str
-) -> Outcomes:
-    """One point whose numbers LAPACK gives up on must not lose the others: find such points one by one.
-
-    Where each can be judged alone and only all of them `together` cannot, none is known to be right: all are withdrawn.
-    """
-    reasons = np.full(outcomes.ok.shape, None, dtype=object)
-    for index in map(tuple, np.argwhere(outcomes.ok)):
-        try:
-            assess(loop.take(index), step, duration)
-            _fastest_mode(request, loop.take(index), np.array(True))
-        except np.linalg.LinAlgError as error:
-            reasons[index] = str(error)
-    failed = np.asarray(reasons != None)  # noqa: E711, elementwise
-    if not np.any(failed):
-        failed, reasons = outcomes.ok, np.full(outcomes.ok.shape, together, dtype=object)
-    return outcomes.failing(failed, Outcome.NOT_CERTIFIED, lambda index: f"the loop cannot be judged: {reasons[index]}")
-
-
-def _certify(outcomes: Outcomes, found: Assessment, asked: tuple[Spec, ...]) -> Outcomes:
-    """Eigenvalues of the loop in state space must be stable, and the specs that chose the gains must be met."""
-    ok = outcomes.ok
-    growth = np.full(ok.shape, np.nan)
-    growth[ok] = largest_real_part(found.poles[ok])
-    outcomes = outcomes.failing(
-        ok & ~(growth < 0),
-        Outcome.NOT_CERTIFIED,
-        lambda index: f"the closed loop has an eigenvalue with real part {growth[index]:.4g} 1/s",
-    )
-    for spec in asked:
-        values = achieved(found, spec.quantity)
-        if values is None:
-            continue
-        outcomes = outcomes.failing(
-            ok & ~spec.met(values),
-            Outcome.NOT_CERTIFIED,
-            lambda index, spec=spec, values=values: (  # type: ignore[misc]
-                f"judged on the loop that is flown, {spec.quantity} is {values[index]:.6g} "
-                f"against {spec.limit:.6g} asked"
-            ),
-        )
-    return outcomes
-
-
-def _kept(gains: tuple[Gain, ...], outcomes: Outcomes) -> tuple[Gain, ...]:
-    return tuple(Gain(g.name, g.unit, np.where(outcomes.ok, g.values, np.nan)) for g in gains)
+    loop = lqr_loop(plant.model, found)
+    return judged(study, plant, request, found.outcomes, _matrix_gains(loop, plant.model.inputs), loop, found)
 
 
 #: Unit of a torque gain on each state.
@@ -245,34 +143,3 @@ def _matrix_gains(loop: Loop, inputs: tuple[str, ...]) -> tuple[Gain, ...]:
         for j, r in enumerate(loop.references)
     ]
     return (*feedback, *forward)
-
-
-def _trim_warnings(study: Study, plant: PlantEnvelope) -> tuple[EnvelopeWarning, ...]:
-    """Tab-only controllers have no actuator for the torque that holds the aileron at its trim."""
-    names = [c.name for c in study.controllers if isinstance(c, ClassicalController)]
-    torque = np.abs(plant.trim.torque[..., 1])
-    held = plant.outcomes.ok & (torque > 1e-9)
-    if not names or not np.any(held):
-        return ()
-    detail = (
-        f"the trim needs an aileron torque of up to {np.max(torque[held]):.4g} N m, which the tab-only controllers "
-        f"({', '.join(names)}) have no actuator for; trim the tab with 'zero_aileron_torque' for a floating aileron"
-    )
-    return (EnvelopeWarning("aileron_torque_at_trim", detail, tuple(int(i) for i in np.flatnonzero(held))),)
-
-
-def _frequency_warnings(study: Study, controllers: tuple[DesignedController, ...]) -> tuple[EnvelopeWarning, ...]:
-    """Points at which a closed loop is too fast for a circulation that is taken as settled."""
-    damping = study.aerodynamics.damping
-    if damping == "unsteady" or not controllers:
-        return ()
-    largest = np.max(np.stack([np.nan_to_num(c.reduced_frequency, nan=0.0) for c in controllers]), axis=(1, 2))
-    fast = np.any([c.reduced_frequency > QUASI_STEADY_LIMIT for c in controllers], axis=0)
-    if not np.any(fast):
-        return ()
-    each = ", ".join(f"{c.request.name} {k:.3g}" for c, k in zip(controllers, largest, strict=True))
-    detail = (
-        f"reduced frequency k of the fastest closed-loop mode of the surfaces up to: {each}; damping '{damping}' takes "
-        f"the circulation as settled, which holds below k = {QUASI_STEADY_LIMIT}; damping 'unsteady' has its lag"
-    )
-    return (EnvelopeWarning("reduced_frequency", detail, tuple(int(i) for i in np.flatnonzero(fast))),)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from design.classical.synthesis import LAWS, ClassicalController
-from schedules.run import DesignedController, DesignedEnvelope
+from design.classical.controller import ClassicalController
+from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.schedule import GainSchedule, Provenance
 
 #: Law of the state-feedback controllers.
@@ -13,7 +13,7 @@ STATE_FEEDBACK = "u = -K x + N r, u = [T_t, T_a]"
 def schedule_of(envelope: DesignedEnvelope, controller: DesignedController, provenance: Provenance) -> GainSchedule:
     """Axes, gains, outcomes and law of the controller, with where they come from."""
     request = controller.request
-    law = LAWS[request.kind] if isinstance(request, ClassicalController) else STATE_FEEDBACK
+    law = request.law if isinstance(request, ClassicalController) else STATE_FEEDBACK
     return GainSchedule(
         controller=request.name,
         kind=request.kind,

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from design.classical.synthesis import ClassicalController
+from design.classical.controller import ClassicalController
 from design.lqr.synthesis import LqrController
+from design.specs import SPEC_PACKS, Spec
 from model.actuators import Actuator
 from model.aerodynamics import Aerodynamics
 from model.flight import SpeedAxis
@@ -54,11 +55,14 @@ class PlantStudy:
 
 @dataclass(frozen=True)
 class Study(PlantStudy):
-    """The plant, its actuators, the reference they are judged on and the controllers to design."""
+    """The plant, its actuators, the reference they are judged on and the controllers to design.
+
+    The specs of `spec_pack` are judged and reported for every controller; they steer none.
+    """
 
     name: str
     tab_actuator: Actuator
     aileron_actuator: Actuator
     reference: Reference
     controllers: tuple[Controller, ...]
-    spec_pack: str = "default"
+    spec_pack: tuple[Spec, ...] = SPEC_PACKS["default"]

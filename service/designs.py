@@ -15,7 +15,8 @@ from design.lqr.synthesis import LqrController
 from design.lqr.weights import ExplicitWeights
 from model.arrays import FloatArray
 from schedules.analysis import PlantEnvelope, analyse
-from schedules.run import ControllerRefused, DesignedController, DesignedEnvelope, run
+from schedules.designed import ControllerRefused, DesignedController, DesignedEnvelope
+from schedules.run import run
 from schedules.schedule import Provenance
 from schedules.study import PlantStudy, Study
 from service import study_of

@@ -6,7 +6,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from threading import Lock
 
-from schedules.run import DesignedEnvelope
+from schedules.designed import DesignedEnvelope
 
 
 class Envelopes:

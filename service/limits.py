@@ -138,8 +138,9 @@ def check_design(request: DesignRequest, settings: Settings) -> None:
     check_size("/controllers", "controllers", controllers, "max_controllers", settings)
     work = points * controllers
     check_size("/grid", "grid points times controllers", work, "max_point_designs", settings)
-    searches = points * sum(wanted.kind != "lqr" for wanted in request.controllers)
-    check_size("/grid", "grid points times tab-only controllers", searches, "max_tab_only_designs", settings)
+    searches = points * sum(wanted.kind != "lqr" and not wanted.all_gains_given for wanted in request.controllers)
+    what = "grid points times tab-only controllers whose gains are chosen"
+    check_size("/grid", what, searches, "max_tab_only_designs", settings)
 
 
 def check_envelope(study: PlantStudy) -> None:

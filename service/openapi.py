@@ -11,7 +11,6 @@ from pydantic.json_schema import models_json_schema
 
 from service.body_examples import BODIES
 from service.errors import MEDIA_TYPE, STATUS, problem
-from service.examples import NAMES, example
 from service.refusals import FieldRefusal
 from service.schemas.problem import FieldProblem, Problem
 from service.units import state_units
@@ -91,8 +90,4 @@ def _complete(path: str, method: str, operation: dict[str, Any], example_id: str
     if MEDIA_TYPE not in operation["responses"].get("422", {}).get("content", {MEDIA_TYPE: None}):
         del operation["responses"]["422"]
     if "requestBody" in operation:
-        operation["requestBody"]["content"]["application/json"]["examples"] = _bodies(path)
-
-
-def _bodies(path: str) -> dict[str, Any]:
-    return BODIES[path]() if path in BODIES else {name: {"summary": name, "value": example(name)} for name in NAMES}
+        operation["requestBody"]["content"]["application/json"]["examples"] = BODIES[path]()

@@ -21,7 +21,9 @@ class Settings(BaseSettings):
     max_controllers: int = Field(default=16, ge=1, description="Controllers of a design")
     max_point_designs: int = Field(default=7500, ge=1, description="Grid points times controllers of a design")
     max_tab_only_designs: int = Field(
-        default=500, ge=1, description="Grid points times tab-only controllers of a design; each takes about 50 ms"
+        default=500,
+        ge=1,
+        description="Grid points times tab-only controllers of a design whose gains are chosen; 1 ms to 0.3 s each",
     )
     max_locus_gains: int = Field(default=2000, ge=2, description="Gains of a root locus")
     max_response_samples: int = Field(default=5000, ge=2, description="Samples of a response")

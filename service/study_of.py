@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from math import radians, tau
+from typing import Literal
 
 import numpy as np
 
-from design.classical.synthesis import ClassicalController
+from design.classical.controller import ClassicalController
 from design.lqr.synthesis import LqrController
 from design.lqr.weights import BrysonWeights, ExplicitWeights
-from design.specs import Spec
+from design.sampling import Sampling
+from design.specs import SPEC_PACKS, Spec
 from model.actuators import Actuator, ActuatorLimits
 from model.aerodynamics import Aerodynamics
+from model.arrays import Floats
 from model.flight import SpeedAxis
 from model.hinge_moments.expansion import Angles
 from model.section import Body, Geometry, Inertia
@@ -19,6 +22,9 @@ from model.trim_request import LARGEST_TRIM_ANGLE, HeldTorque, TrimRequest
 from schedules.study import Controller, GridRequest, PlantStudy, Reference, Study
 from service.schemas import actuators, aerodynamics, controller_requests, flight, requests, section, weights
 from service.schemas import trim as trims
+from service.schemas.given_gains import Gains
+from service.schemas.grid_values import GridAxes, OverGrid
+from service.schemas.specs import SpecPack, Specs
 from service.source_of import hinge_moment_source, model_refuses
 from service.spec_names import SPEC_FIELDS
 
@@ -31,6 +37,7 @@ SPEED_AXIS: dict[str, SpeedAxis] = {
 
 def study(request: requests.DesignRequest) -> Study:
     """The study that a design request asks for."""
+    axes = GridAxes.of(request.grid)
     return Study(
         name=request.name,
         geometry=geometry(request.geometry),
@@ -41,8 +48,8 @@ def study(request: requests.DesignRequest) -> Study:
         tab_actuator=tab_actuator(request.actuators.tab),
         aileron_actuator=aileron_actuator(request.actuators.aileron),
         reference=Reference(radians(request.reference.aileron_deg), request.reference.duration_s),
-        controllers=tuple(controller(wanted) for wanted in request.controllers),
-        spec_pack=request.spec_pack,
+        controllers=tuple(controller(wanted, axes) for wanted in request.controllers),
+        spec_pack=spec_pack(request.spec_pack, axes),
     )
 
 
@@ -167,18 +174,51 @@ def limits(wire: actuators.Limits) -> ActuatorLimits:
     )
 
 
-def controller(wire: controller_requests.Controller) -> Controller:
+def controller(wire: controller_requests.Controller, axes: GridAxes) -> Controller:
     """A controller by its kind."""
     if isinstance(wire, controller_requests.Lqr):
         return LqrController(wire.name, lqr_weights(wire.weights), wire.tab_allocation)
-    cut_off = wire.rate_filter_hz if isinstance(wire, controller_requests.NegativeFeedback) else None
-    return ClassicalController(wire.name, wire.kind, specs(wire.specs), _rad_s(cut_off))
+    return ClassicalController(
+        name=wire.name,
+        kind=wire.kind,
+        specs=specs(wire.specs, axes),
+        rate_filter=_rad_s(wire.rate_filter_hz) if isinstance(wire, controller_requests.NegativeFeedback) else None,
+        tab_command=wire.tab_command,
+        gains={} if wire.gains is None else gains(wire.gains, axes),
+        sampling=sampling(wire),
+        smoothness=0.0 if wire.smoothing is None else wire.smoothing.bandwidth_loss_percent_max / 100.0,
+    )
 
 
-def specs(wire: controller_requests.Specs) -> tuple[Spec, ...]:
+def specs(wire: Specs, axes: GridAxes, source: Literal["request", "spec_pack"] = "request") -> tuple[Spec, ...]:
     """The specs that were given, each in the unit of its quantity."""
-    given = {name: getattr(wire, name) for name in type(wire).model_fields}
-    return tuple(SPEC_FIELDS[name].spec(value) for name, value in given.items() if value is not None)
+    return tuple(SPEC_FIELDS[name].spec(over_grid(limit, axes), source) for name, limit in wire if limit is not None)
+
+
+def spec_pack(wire: str | SpecPack, axes: GridAxes) -> tuple[Spec, ...]:
+    """The specs of a shipped pack, or of the one that the request brings."""
+    return SPEC_PACKS[wire] if isinstance(wire, str) else specs(wire.specs, axes, "spec_pack")
+
+
+def gains(wire: Gains, axes: GridAxes) -> dict[str, Floats]:
+    """The gains that were given, in SI and radians as on the wire."""
+    return {name: over_grid(gain, axes) for name, gain in wire if gain is not None}
+
+
+def sampling(wire: controller_requests.Classical) -> Sampling | None:
+    """How a digital controller runs; None for a continuous one."""
+    if wire.sample_time_s is None or wire.computational_delay_s is None:
+        return None
+    return Sampling(wire.sample_time_s, wire.computational_delay_s)
+
+
+def over_grid(wire: float | OverGrid, axes: GridAxes) -> Floats:
+    """A number, or the value at every point of the grid, in the grid's shape."""
+    if not isinstance(wire, OverGrid):
+        return wire
+    values = np.array(wire.values, dtype=float)
+    along_first = wire.axis == axes.names[0]
+    return np.ascontiguousarray(np.broadcast_to(values[:, None] if along_first else values, axes.counts))
 
 
 def lqr_weights(wire: controller_requests.Weights) -> BrysonWeights | ExplicitWeights:

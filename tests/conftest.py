@@ -71,7 +71,7 @@ def tab_actuator():
 @pytest.fixture(scope="session")
 def wind_tunnel_study():
     """The example wind_tunnel as a study: nf, pf and lqr over the grid of 2 x 4."""
-    from design.classical.synthesis import ClassicalController
+    from design.classical.controller import ClassicalController
     from design.lqr.synthesis import LqrController
     from design.lqr.weights import BrysonWeights
     from design.specs import Spec

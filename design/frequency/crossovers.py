@@ -1,7 +1,7 @@
 """Where a loop crosses the unit circle and the negative real axis, to the last digit.
 
 Crossings start from the roots of polynomials in ``x = w^2`` (or, for the real axis with a delay in the loop,
-from brackets on a grid) and end with Newton steps on the state-space response.
+from brackets on a grid) and end with a Newton step on the response itself.
 """
 
 from __future__ import annotations
@@ -11,19 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.frequency.delayed import real_axis_brackets
-from design.frequency.feedback import ClosedLoop, complementary, log_slope, open_loop_value
-from design.frequency.polynomials import imaginary_cross, roots, squared_magnitude
-from model.arrays import ComplexArray, FloatArray, GridArrays
+from design.frequency.delayed import GridResponse, grid_response, real_axis_starts, unit_circle_starts
+from design.frequency.feedback import MOST_STATES, ClosedLoop, complementary, log_slope, open_loop_value
+from design.frequency.polynomials import imaginary_cross, real_cross, squared_magnitude
+from design.frequency.positive_roots import position_in_row, positive_roots
+from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
 
-#: A root counts as real when its imaginary part is below this part of its size (the curve touches).
-NEARLY_REAL = 1e-6
 #: A Newton step from a root of the polynomials is never longer than this part of the frequency.
 SETTLED = 1e-5
 #: Gain ratios outside this range are no margins but the trace of a pole at the origin, or of no loop at all.
 RATIO_RANGE = (1e-6, 1e6)
-#: With a delay, how many crossings of the real axis are kept.
-DELAYED_CROSSINGS = 16
+#: With a delay or very many states, how many crossings of the real axis are kept.
+SEARCHED_CROSSINGS = 16
 
 #: Real function of T and dT/dw that is zero at the crossing, and its derivative with respect to w.
 Residual = Callable[[ComplexArray, ComplexArray], tuple[FloatArray, FloatArray]]
@@ -38,28 +37,46 @@ class Crossings(GridArrays):
     slope: ComplexArray
 
 
-def gain_crossings(loop: ClosedLoop) -> Crossings:
-    """All frequencies where ``|L| = 1`` (N, n). A delay has no part in them; T is the one without it."""
-    ratio = loop.transfer
-    x = positive_roots(squared_magnitude(ratio.denominator) - squared_magnitude(ratio.numerator))
-    return _polished(loop, np.sqrt(x), _log_magnitude, delayed=False)
+def gain_crossings(loop: ClosedLoop, found: GridResponse | None = None) -> Crossings:
+    """All frequencies where ``|L| = 1`` (N, n). A delay has no part in them; T is the one without it.
+
+    Parameters
+    ----------
+    found : `design.frequency.delayed.grid_response` of the loop where it is at hand; of use for many states only
+    """
+    if loop.numerator.shape[1] - 1 > MOST_STATES:
+        start = unit_circle_starts(loop, found or grid_response(loop))
+    else:
+        T, whole = loop.numerator, loop.characteristic
+        start = np.sqrt(positive_roots(squared_magnitude(whole) - 2.0 * real_cross(T, whole)))
+    rows, w, value, slope = _polished(loop, start, _log_magnitude, delayed=False)
+    return _in_rows((start.shape[0], loop.numerator.shape[1] - 1), rows, w, value, slope)
 
 
-def phase_crossings(loop: ClosedLoop) -> Crossings:
+def phase_crossings(loop: ClosedLoop, found: GridResponse | None = None) -> Crossings:
     """All frequencies where L is real and negative, zero frequency included, (N, n).
 
-    With a delay (N, `DELAYED_CROSSINGS`): those whose critical gain ratio is nearest to 1.
+    Of a sampled loop half the sampling rate is one as well, so that there are (N, n+1).
+    With a delay, or more than `MOST_STATES`, (N, `SEARCHED_CROSSINGS`): those whose critical gain ratio is
+    nearest to 1.
+
+    Parameters
+    ----------
+    found : `design.frequency.delayed.grid_response` of the loop where it is at hand; of use where it is searched only
     """
-    if loop.delayed:
-        start, width = real_axis_brackets(loop, DELAYED_CROSSINGS), DELAYED_CROSSINGS
+    if loop.searched:
+        start = real_axis_starts(loop, found or grid_response(loop), SEARCHED_CROSSINGS)
     else:
-        start, width = real_axis_frequencies(loop.transfer.numerator, loop.transfer.denominator), None
-    found = _polished(loop, start, _imaginary, loop.delayed)
-    distance = np.abs(np.log(critical_ratio(found.value)))
-    nearest = np.argsort(distance, axis=-1)[:, :width]
-    omega = np.where(np.isnan(distance), np.nan, found.omega)
-    value, slope = (np.take_along_axis(v, nearest, axis=-1) for v in (found.value, found.slope))
-    return _sorted(np.take_along_axis(omega, nearest, axis=-1), value, slope)
+        start = real_axis_frequencies(loop.numerator, loop.characteristic)
+    if loop.sample_time is not None:
+        start = np.concatenate([start, np.full((start.shape[0], 1), np.inf)], axis=-1)
+    width = SEARCHED_CROSSINGS if loop.searched else start.shape[1]
+    rows, w, value, slope = _polished(loop, start, _imaginary, loop.delayed)
+    ratio = critical_ratio(value)
+    kept = ~np.isnan(ratio)
+    if loop.searched:
+        kept &= _nearest(rows, ratio, start.shape[0], width)
+    return _in_rows((start.shape[0], width), rows[kept], w[kept], value[kept], slope[kept])
 
 
 def critical_ratio(T: ComplexArray) -> FloatArray:
@@ -69,16 +86,8 @@ def critical_ratio(T: ComplexArray) -> FloatArray:
         return np.where((ratio > RATIO_RANGE[0]) & (ratio < RATIO_RANGE[1]), ratio, np.nan)
 
 
-def positive_roots(p: FloatArray) -> FloatArray:
-    """Positive real roots of (N, m+1), (N, m) nan padded; of a pair that rounding took off the axis, one."""
-    x = roots(p)
-    with np.errstate(invalid="ignore"):
-        real = (x.real > 0.0) & (x.imag >= 0.0) & (x.imag <= NEARLY_REAL * np.abs(x))
-    return np.where(real, x.real, np.nan)
-
-
 def real_axis_frequencies(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
-    """Zero, and the frequencies where the ratio of two (N, n+1) polynomials is real: (N, n), nan padded."""
+    """Zero, and the frequencies where the ratio of two (N, n+1) polynomials is real: (N, n), rising, nan padded."""
     x = positive_roots(imaginary_cross(numerator, denominator))
     return np.concatenate([np.zeros((x.shape[0], 1)), np.sqrt(x)], axis=-1)
 
@@ -91,26 +100,39 @@ def _imaginary(T: ComplexArray, slope: ComplexArray) -> tuple[FloatArray, FloatA
     return T.imag, slope.imag
 
 
-def _polished(loop: ClosedLoop, start: FloatArray, residual: Residual, delayed: bool) -> Crossings:
-    """One Newton step from `start` (N, M); what is not there already was no crossing and is dropped."""
+def _polished(
+    loop: ClosedLoop, start: FloatArray, residual: Residual, delayed: bool
+) -> tuple[IntArray, FloatArray, ComplexArray, ComplexArray]:
+    """Rows, frequencies, T and dT/dw (K,) one Newton step from `start` (N, M), row by row.
+
+    What is not there already was no crossing and is dropped.
+    """
     valid = ~np.isnan(start)
-    rows = np.nonzero(valid)[0]
-    w = start[valid]
+    rows, w = np.nonzero(valid)[0], start[valid]
     with np.errstate(divide="ignore", invalid="ignore"):
         error, rate = residual(*complementary(loop, rows, w, delayed))
         step = np.where(error == 0.0, 0.0, error / rate)
         close = np.abs(step) <= SETTLED * w
-    w = np.where(close, w - step, w)
-    T, T_slope = complementary(loop, rows, w, delayed)
-    omega = np.full(start.shape, np.nan)
-    value, slope = (np.full(start.shape, complex(np.nan, np.nan)) for _ in range(2))
-    omega[valid], value[valid], slope[valid] = np.where(close, w, np.nan), T, T_slope
-    return _sorted(omega, value, slope)
+    if not close.all():
+        rows, w, step = rows[close], w[close], step[close]
+    w = w - step
+    return rows, w, *complementary(loop, rows, w, delayed)
 
 
-def _sorted(omega: FloatArray, value: ComplexArray, slope: ComplexArray) -> Crossings:
-    order = np.argsort(omega, axis=-1)
-    frequency = np.take_along_axis(omega, order, axis=-1)
-    gone = np.isnan(frequency)
-    T, T_slope = (np.where(gone, np.nan, np.take_along_axis(v, order, axis=-1)) for v in (value, slope))
-    return Crossings(frequency, T, T_slope)
+def _nearest(rows: IntArray, ratio: FloatArray, count: int, width: int) -> BoolArray:
+    """Mask of the `width` entries of each row (K,) whose `ratio` (K,) is nearest to 1; nan is farthest."""
+    order = np.lexsort((np.abs(np.log(ratio)), rows))
+    kept = np.empty(rows.size, dtype=bool)
+    kept[order] = position_in_row(rows, count) < width
+    return kept
+
+
+def _in_rows(
+    shape: tuple[int, ...], rows: IntArray, w: FloatArray, value: ComplexArray, slope: ComplexArray
+) -> Crossings:
+    """Entries (K,) in the order of their `rows` (K,), put side by side in arrays of that shape (N, M)."""
+    place = rows, position_in_row(rows, shape[0])
+    omega = np.full(shape, np.nan)
+    T, T_slope = (np.full(shape, complex(np.nan, np.nan)) for _ in range(2))
+    omega[place], T[place], T_slope[place] = w, value, slope
+    return Crossings(omega, T, T_slope)

@@ -8,17 +8,18 @@ where ``Re T = 1/2``; the sensitivity is ``1 - T``. A delay multiplies L by ``ex
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 
 import numpy as np
 
-from design.frequency.polynomials import nearby_power_of_two, with_roots
-from design.frequency.transfer import Transfer, markov_parameters, response, transfer_of_poles
+from design.frequency.polynomials import nearby_power_of_two, powers, with_roots
+from design.frequency.transfer import Transfer, transfer
 from design.loop import SisoLoop
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
 
-AnyArray = TypeVar("AnyArray", FloatArray, ComplexArray)
+#: Polynomials of the squared magnitude of more states than this lose their roots to rounding.
+MOST_STATES = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,23 +28,20 @@ class ClosedLoop(GridArrays):
 
     Attributes
     ----------
-    A, b, c : (N, n, n), (N, n), (N, n), closed loop and transfer ``T = c (sI - A)^-1 b``
-    transfer : the open loop L, (N, n+1) coefficients
-    poles : (N, n) of the closed loop, the delay left out
-    scale : (N,) [rad/s]
+    matrix : (N, n, n) state matrix of the closed loop, the delay left out, in units of its own
+    numerator, characteristic : (N, n+1) ``T = numerator / characteristic`` without the delay; the latter monic
+    scale : (N,) unit of frequency, in units of `matrix`
     delay : (N,) transport delay times `scale`
-    regular : (N,) mask of the points without a closed-loop pole on the axis. The others are replaced by
-        ``L = 0``: they have no margins, and must not stop the rest
+    sample_time : (N,) where the axis is the unit circle of z, ``s = (z - 1) / (z + 1)``: sample time [s].
+        Infinite frequency is half the sampling rate then, and T need not vanish there. None: s in rad/s
     """
 
-    A: FloatArray
-    b: FloatArray
-    c: FloatArray
-    transfer: Transfer
-    poles: ComplexArray
+    matrix: FloatArray
+    numerator: FloatArray
+    characteristic: FloatArray
     scale: FloatArray
     delay: FloatArray
-    regular: BoolArray
+    sample_time: FloatArray | None = None
 
     @property
     def delayed(self) -> bool:
@@ -51,43 +49,91 @@ class ClosedLoop(GridArrays):
         return bool(np.any(self.delay > 0.0))
 
     @property
-    def characteristic(self) -> FloatArray:
-        """Characteristic polynomial of the closed loop without delay (N, n+1)."""
-        return self.transfer.denominator + self.transfer.numerator
+    def searched(self) -> bool:
+        """Whether its crossings are to be searched on a grid: the roots of polynomials do not serve."""
+        return self.delayed or self.matrix.shape[-1] > MOST_STATES
+
+    @property
+    def transfer(self) -> Transfer:
+        """The open loop L without delay, (N, n+1) coefficients."""
+        return Transfer(self.numerator, self.characteristic - self.numerator)
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """Poles of the closed loop (N, n) without the delay."""
+        return np.asarray(np.linalg.eigvals(self.matrix) / self.scale[:, None], dtype=complex)
+
+    @cached_property
+    def regular(self) -> BoolArray:
+        """Mask (N,) of the points without a closed-loop pole on the axis."""
+        return np.asarray(np.abs(self.poles.real).min(axis=-1) > 1e-12 * np.abs(self.poles).max(axis=-1))
+
+    @cached_property
+    def stable(self) -> BoolArray:
+        """Mask (N,) of the points that are stable without their delay: all poles left of the axis, and off it."""
+        return np.asarray(self.regular & (self.poles.real.max(axis=-1) < 0.0))
+
+    def frequency(self, omega: FloatArray) -> FloatArray:
+        """`omega` (N, m) in rad/s."""
+        x = omega * self.scale[:, None]
+        return x if self.sample_time is None else 2.0 * np.arctan(x) / self.sample_time[:, None]
+
+    def quietened(self, kept: BoolArray) -> ClosedLoop:
+        """``L = 0`` where the mask (N,) is False: points that have no margins must not stop the rest."""
+        if kept.all():
+            return self
+        n = self.matrix.shape[-1]
+        matrix = np.where(kept[:, None, None], self.matrix, -np.eye(n))
+        numerator = np.where(kept[:, None], self.numerator, 0.0)
+        characteristic = np.where(kept[:, None], self.characteristic, with_roots(-np.ones(n, dtype=complex)))
+        scale = np.where(kept, self.scale, 1.0)
+        return replace(self, matrix=matrix, numerator=numerator, characteristic=characteristic, scale=scale)
 
 
 def closed_loop(loop: SisoLoop) -> ClosedLoop:
-    """`loop` at the gain it is flown with, sign and gain drawn into b; `ClosedLoop` says how it is held."""
+    """`loop` at the gain it is flown with; `ClosedLoop` says how it is held.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError : an entry is not finite
+    """
     n = loop.A.shape[-1]
     A, c = loop.A.reshape(-1, n, n), loop.c.reshape(-1, n)
     b = loop.b.reshape(-1, n) * (loop.sign * loop.gain.reshape(-1))[:, None]
-    closed = A - b[:, :, None] * c[:, None, :]
-    poles: ComplexArray = np.linalg.eigvals(closed).astype(complex)
-    open_poles: ComplexArray = np.linalg.eigvals(A).astype(complex)
-    scale = nearby_power_of_two(np.maximum(np.abs(poles), np.abs(open_poles)).max(axis=-1))
-    open_loop = transfer_of_poles(open_poles, poles, np.ones_like(scale), markov_parameters(A, b, c))
-    ratio = open_loop.scaled(scale)
-    closed, b = closed / scale[:, None, None], b / scale[:, None]
-    poles = np.asarray(poles / scale[:, None], dtype=complex)
-    regular = np.abs(poles.real).min(axis=-1) > 1e-12 * np.abs(poles).max(axis=-1)
-    if not regular.all():
-        closed, b = _replaced(closed, regular, -np.eye(n)), _replaced(b, regular, 0.0)
-        poles = _replaced(poles, regular, -1.0)
-        no_loop = (ratio.numerator, 0.0), (ratio.denominator, with_roots(-np.ones(n, dtype=complex)))
-        ratio = Transfer(*(_replaced(v, regular, w) for v, w in no_loop))
-    return ClosedLoop(closed, b, c, ratio, poles, scale, loop.delay * scale, regular)
+    matrix = A - b[:, :, None] * c[:, None, :]
+    if not np.all(np.isfinite(matrix)):
+        raise np.linalg.LinAlgError("the closed loop has an entry that is not finite")
+    found, scale = scaled(transfer(matrix, b, c))
+    return ClosedLoop(matrix, found.numerator, found.denominator, scale, loop.delay * scale)
 
 
-def _replaced(values: AnyArray, kept: BoolArray, others: FloatArray | float) -> AnyArray:
-    return np.where(kept.reshape(-1, *(1,) * (values.ndim - 1)), values, others)
+def scaled(ratio: Transfer) -> tuple[Transfer, FloatArray]:
+    """The same transfer (N, n+1) in a unit of frequency (N,) such that no pole is large, and the unit."""
+    n = ratio.denominator.shape[-1] - 1
+    size = np.abs(ratio.denominator[:, 1:]) ** (1.0 / np.arange(1, n + 1))
+    scale = nearby_power_of_two(size.max(axis=-1))
+    return ratio.scaled(scale), scale
 
 
 def complementary(
     loop: ClosedLoop, rows: IntArray, omega: FloatArray, delayed: bool
 ) -> tuple[ComplexArray, ComplexArray]:
-    """T and dT/dw (K,) at the frequencies `omega` (K,) of the points `rows` (K,), from the matrices."""
-    at = response(loop.A[rows], loop.b[rows], loop.c[rows], np.asarray(1j * omega[:, None], dtype=complex))
-    value, slope = at.value[:, 0], 1j * at.slope[:, 0]
+    """T and dT/dw (K,) at the frequencies `omega` (K,) of the points `rows` (K,); infinity is one."""
+    length = loop.numerator.shape[-1]
+    with np.errstate(divide="ignore"):
+        inverse = 1.0 / omega
+    # Numerator and denominator both over w^n where w is large: nothing overflows, infinity included.
+    large = omega > 1.0
+    rising = powers(np.where(large, inverse, omega), length + 1)
+    terms = np.where(large, rising[:0:-1], rising[1:])
+    power = np.arange(length - 1.0, -1.0, -1.0)[:, None]
+    shifted = np.where(large, rising[-2::-1], np.concatenate([rising[2:], np.zeros((1, omega.size))]))
+    both = np.stack([loop.numerator, loop.characteristic])[:, rows].swapaxes(1, 2)
+    parts = _axis(length) @ np.concatenate([both * terms, both * (power * shifted)])
+    numerator, characteristic, numerator_slope, characteristic_slope = parts[:, 0] + 1j * parts[:, 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = numerator / characteristic
+        slope = (numerator_slope - value * characteristic_slope) / characteristic
     if not delayed:
         return value, slope
     delay = loop.delay[rows]
@@ -96,6 +142,13 @@ def complementary(
     top_slope = turn * (slope - 1j * delay * value)
     bottom_slope = (turn - 1.0) * slope - 1j * delay * top
     return top / bottom, (top_slope * bottom - top * bottom_slope) / bottom**2
+
+
+@cache
+def _axis(length: int) -> FloatArray:
+    """Real and imaginary parts (2, length) of the powers of j, highest first."""
+    power = np.arange(length - 1, -1, -1)
+    return np.array([1.0, 0.0, -1.0, 0.0])[np.stack([power, power - 1]) % 4]
 
 
 def open_loop_value(T: ComplexArray) -> ComplexArray:

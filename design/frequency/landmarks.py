@@ -8,12 +8,12 @@ from typing import Self
 import numpy as np
 
 from design.frequency.crossovers import real_axis_frequencies
+from design.frequency.poles import pole_order
 from design.frequency.polynomials import (
     evaluate,
     leading_zeros,
     magnitude_bound,
     nearby_power_of_two,
-    product,
     roots,
     with_derivatives,
 )
@@ -46,6 +46,7 @@ class Landmarks(GridArrays):
     Attributes
     ----------
     A, b, c : (N, n, n), (N, n), (N, n)
+    poles, moved : (N, n) closed-loop poles at the gain 0, in `pole_order`, and at the reference
     transfer : L as polynomials, (N, n+1)
     markov : (N, n+1) its expansion at infinity
     reference : (N,) a gain that moves the poles fairly
@@ -56,6 +57,8 @@ class Landmarks(GridArrays):
     A: FloatArray
     b: FloatArray
     c: FloatArray
+    poles: ComplexArray
+    moved: ComplexArray
     transfer: Transfer
     markov: FloatArray
     reference: FloatArray
@@ -68,7 +71,7 @@ class Landmarks(GridArrays):
 
         The reference is `gain` (N,), or where that is 0 the natural one.
         """
-        poles = np.linalg.eigvals(A).astype(complex)
+        poles = pole_order(np.linalg.eigvals(A).astype(complex))
         if np.any(gain == 0.0):
             gain = np.where(gain == 0.0, natural_gain(A, b, c, poles), gain)
         moved = np.linalg.eigvals(A - gain[:, None, None] * b[:, :, None] * c[:, None, :]).astype(complex)
@@ -80,7 +83,7 @@ class Landmarks(GridArrays):
         poles, moved = (np.asarray(v / scale[:, None], dtype=complex) for v in (poles, moved))
         ratio = transfer_of_poles(poles, moved, gain, markov)
         origin = LOW * np.where(np.isfinite(slowest), slowest / scale, 1.0)
-        return cls(A, b, c, ratio, markov, gain, origin, scale)
+        return cls(A, b, c, poles, moved, ratio, markov, gain, origin, scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +104,13 @@ def crossings(landmarks: Landmarks) -> Marks:
     gain[:, 0] = _gain_at_origin(landmarks)
     rows = np.nonzero(marked)[0]
     w = omega[marked]
-    at = _response(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], s[marked][:, None])
+    at = response_beside_poles(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], s[marked][:, None])
     with np.errstate(divide="ignore", invalid="ignore"):
-        step = np.where(at.value.imag == 0.0, 0.0, at.value.imag / at.slope.real)[:, 0]
-    close = np.abs(step) <= SETTLED * w
-    s[marked] = 1j * np.where(close, w - step, w)
-    at = _response(landmarks.A[rows], landmarks.b[rows], landmarks.c[rows], s[marked][:, None])
-    gain[marked] = np.where(close, (-1.0 / at.value[:, 0]).real, np.nan)
-    gain = np.where(_in_range(gain, landmarks), gain, np.nan)
+        step = np.where(at.value.imag == 0.0, 0.0, at.value.imag / at.slope.real)
+        close = np.abs(step[:, 0]) <= SETTLED * w
+        gain[marked] = np.where(close, (-1.0 / value_beside(at, -1j * step)[:, 0]).real, np.nan)
+    s[marked] = 1j * np.where(close, w - step[:, 0], w)
+    gain = np.where(in_range(gain, landmarks), gain, np.nan)
     return _sorted(gain, np.asarray(s * landmarks.scale[:, None], dtype=complex))
 
 
@@ -124,37 +126,64 @@ def _gain_at_origin(landmarks: Landmarks) -> FloatArray:
     limit = (np.abs(far - near) < 1e-3 * np.abs(near)) & np.any(landmarks.markov != 0.0, axis=-1)
     inverse = -1.0 / np.where(limit[:, None], L, 1.0).real
     gain = (4.0 * inverse[:, 0] - inverse[:, 1]) / 3.0
-    return np.where(limit & _in_range(gain[:, None], landmarks)[:, 0], gain, np.nan)
+    return np.where(limit & in_range(gain[:, None], landmarks)[:, 0], gain, np.nan)
 
 
-def _in_range(gain: FloatArray, landmarks: Landmarks) -> BoolArray:
+def in_range(gain: FloatArray, landmarks: Landmarks) -> BoolArray:
     """Mask of the gains (N, M) > 0 that are not 0 or infinite but for rounding."""
     part = gain / landmarks.reference[:, None]
     return np.asarray((part > RANGE[0]) & (part < RANGE[1]))
 
 
-def breakaways(landmarks: Landmarks) -> Marks:
-    """Gains > 0 at which two poles meet, (N, 2n-2), and where: ``dk/ds = 0``, that is ``L'(s) = 0``."""
+@dataclass(frozen=True, eq=False)
+class StationaryPoints(GridArrays):
+    """Where ``dL/ds = 0``: points (N, 2n-2), nan padded, and the gains there (N, 2n-2), most of them complex."""
+
+    point: ComplexArray
+    gain: ComplexArray
+
+
+def stationary_points(landmarks: Landmarks) -> StationaryPoints:
+    """All points at which two poles meet at some gain, real or not, as far as polynomials tell."""
     ratio = landmarks.transfer
     width = max(2 * ratio.denominator.shape[-1] - 4, 0)
     top, bottom = with_derivatives(ratio.numerator), with_derivatives(ratio.denominator)
-    stationary = product(bottom[:, 0], top[:, 1]) - product(bottom[:, 1], top[:, 0])
+    stationary = _product(bottom[:, 0], top[:, 1]) - _product(bottom[:, 1], top[:, 0])
     s = roots(stationary)[:, :width]
-    marked = _significant(ratio, s, VANISHING)
-    estimate = -evaluate(ratio.denominator, s) / np.where(marked, evaluate(ratio.numerator, s), 1.0)
+    there = _significant(ratio, s, VANISHING)
+    gain = -evaluate(ratio.denominator, s) / np.where(there, evaluate(ratio.numerator, s), 1.0)
+    return StationaryPoints(s, np.where(there, gain, complex(np.nan, np.nan)))
+
+
+def _product(p: FloatArray, q: FloatArray) -> FloatArray:
+    """``p q`` of two (N, n+1), (N, 2n+1), each point by itself: in a matrix product its neighbours have a part in the
+    last digit, and of that the poles of a breakaway gain keep every other one.
+    """
+    n = p.shape[-1]
+    result = np.zeros((p.shape[0], 2 * n - 1))
+    for i in range(n):
+        result[:, i : i + n] += p[:, i : i + 1] * q
+    return result
+
+
+def breakaways(landmarks: Landmarks, found: StationaryPoints) -> Marks:
+    """Gains > 0 at which two poles meet, (N, 2n-2), and where: ``dk/ds = 0``, that is ``L'(s) = 0``."""
+    s = found.point.copy()
     with np.errstate(invalid="ignore"):
-        marked &= _in_range(estimate.real, landmarks) & (np.abs(estimate.imag) <= PLAUSIBLE * estimate.real)
+        plausible = np.abs(found.gain.imag) <= PLAUSIBLE * found.gain.real
+        marked = plausible & in_range(found.gain.real, landmarks)
     gain = np.full(s.shape, np.nan)
     rows = np.nonzero(marked)[0]
     start = point = s[marked]
     A, b, c = landmarks.A[rows], landmarks.b[rows], landmarks.c[rows]
     for _ in range(3):
-        at = _response(A, b, c, point[:, None])
+        at = response_beside_poles(A, b, c, point[:, None])
         with np.errstate(divide="ignore", invalid="ignore"):
-            step = np.where(at.slope == 0.0, 0.0, at.slope / at.curvature)[:, 0]
+            step = np.where(at.slope == 0.0, 0.0, at.slope / at.curvature)
+            k = -1.0 / value_beside(at, -step)[:, 0]
+        step = step[:, 0]
         point = np.where(np.abs(step) <= NEARBY * np.abs(point), point - step, point)
     settled = (np.abs(step) <= SETTLED * np.abs(point)) & (np.abs(point - start) <= NEARBY * np.abs(start))
-    k = -1.0 / _response(A, b, c, point[:, None]).value[:, 0]
     # A point that is its own mirror image but for rounding is real.
     s[marked] = np.where(np.abs(point.imag) <= SAME * np.abs(point), point.real, point)
     gain[marked] = np.where(settled & (np.abs(k.imag) <= NEARLY_REAL * np.abs(k)), k.real, np.nan)
@@ -181,7 +210,12 @@ def asymptotes(landmarks: Landmarks) -> tuple[FloatArray, FloatArray]:
     return np.where(exists, centroid, np.nan), np.sort(angle, axis=-1)
 
 
-def _response(A: FloatArray, b: FloatArray, c: FloatArray, s: ComplexArray) -> Response:
+def value_beside(at: Response, step: ComplexArray) -> ComplexArray:
+    """L a step of at most `SETTLED` (in parts of the frequency) away: to the third power of that."""
+    return np.asarray(at.value + step * (at.slope + 0.5 * step * at.curvature))
+
+
+def response_beside_poles(A: FloatArray, b: FloatArray, c: FloatArray, s: ComplexArray) -> Response:
     """Response at `s`, or a rounding beside it where a pole that does not move happens to be exactly there."""
     try:
         return response(A, b, c, s)
@@ -198,13 +232,14 @@ def _significant(ratio: Transfer, s: ComplexArray, least: float) -> BoolArray:
 def _sorted(gain: FloatArray, point: ComplexArray) -> Marks:
     """Only gains > 0, rising; of the two of a pair the lower one first; each point once."""
     gain = np.where(gain > 0.0, gain, np.nan)
-    lower = np.argsort(point.imag, axis=-1)
-    rising = np.argsort(np.take_along_axis(gain, lower, axis=-1), axis=-1, stable=True)
-    order = np.take_along_axis(lower, rising, axis=-1)
-    gain, point = np.take_along_axis(gain, order, axis=-1), np.take_along_axis(point, order, axis=-1)
+    gain, point = _by_gain(gain, point)
     apart = np.abs(point[:, :, None] - point[:, None, :]) > SAME * np.abs(point)[:, None, :]
     repeated = ~(apart | np.isnan(gain)[:, None, :] | np.triu(np.ones(apart.shape[-2:], dtype=bool)))
-    gain = np.where(repeated.any(axis=-1), np.nan, gain)
-    order = np.argsort(gain, axis=-1, stable=True)
-    gain, point = np.take_along_axis(gain, order, axis=-1), np.take_along_axis(point, order, axis=-1)
+    gain, point = _by_gain(np.where(repeated.any(axis=-1), np.nan, gain), point)
     return Marks(gain, np.where(np.isnan(gain), complex(np.nan, np.nan), point))
+
+
+def _by_gain(gain: FloatArray, point: ComplexArray) -> tuple[FloatArray, ComplexArray]:
+    order = np.lexsort((point.imag, gain), axis=-1)
+    rows = np.arange(len(gain))[:, None]
+    return gain[rows, order], point[rows, order]

@@ -1,33 +1,31 @@
 """Poles of ``A - k M`` for many gains k, M of rank one, at a fraction of the eigenvalue problems.
 
-The characteristic polynomial is affine in k. So between two gains whose poles a and b are known it is, with
-t the part of the way, ``(1 - t) prod(s - a_j) + t prod(s - b_j)``: no coefficients, and no digits lost to
-them. Its roots are found from a cubic between a and b by simultaneous iteration (Weierstrass 1891, Durand,
-Kerner), and kept when the discs that are known to hold them do not touch. What is left, above all the gains
-next to those at which poles meet, are eigenvalue problems again.
+Eigenvalues are computed at some of the gains; between them `Segments` finds the poles and proves that they are all.
+What it leaves open, above all where more than two poles meet at once, are eigenvalue problems again.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from design.frequency.locus_pairs import half_plane_order
+from design.frequency.locus_segments import Segments
 from design.frequency.poles import pole_order
 from model.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from model.branches import continuations, squared_gaps
 
-#: Every how many gains the eigenvalues themselves are computed, and again in the segments that this leaves open.
-STRIDES = (16, 4)
-#: Number of iterations; each doubles the number of digits.
-ITERATIONS = 3
-#: Largest last correction over the distance to the nearest root; the error left is smaller by as much again.
-SEPARATED = 1e-6
+#: At most how many gains lie between two eigenvalue problems; the second number is for what the first leaves open.
+STRIDES = (32, 8)
+#: Fewer gains than this between two others are eigenvalue problems at once when they are left open.
+FEW = 4
 
 
 def poles_along(A: FloatArray, M: FloatArray, gains: FloatArray) -> ComplexArray:
     """Eigenvalues of ``A - k M`` (N, K, n).
 
-    Those that come from an eigenvalue problem are in `pole_order`; the others keep the places of those they
-    continue, so that few lists differ in their order from the one before.
+    Those that come from an eigenvalue problem are in `half_plane_order`; the others keep the places of those they
+    continue, so that few lists differ in their order from the one before. The first list is in `pole_order`.
 
     Parameters
     ----------
@@ -36,97 +34,75 @@ def poles_along(A: FloatArray, M: FloatArray, gains: FloatArray) -> ComplexArray
     """
     values = np.empty((*gains.shape, A.shape[-1]), dtype=complex)
     missing = np.ones(gains.shape, dtype=bool)
-
-    def solve(wanted: BoolArray) -> None:
-        rows = np.nonzero(wanted)[0]
-        closed = A[rows] - gains[wanted][:, None, None] * M[rows]
-        values[wanted] = pole_order(np.linalg.eigvals(closed).astype(complex))
-        missing[wanted] = False
-
-    for stride in STRIDES:
-        rows, first = _open_segments(missing, stride)
-        ends = np.zeros_like(missing)
-        ends[rows, first] = ends[rows, first + stride] = True
-        solve(ends & missing)
-        inner = first[:, None] + np.arange(1, stride)
-        k, low, high = gains[rows[:, None], inner], gains[rows, first], gains[rows, first + stride]
-        parts = (k - low[:, None]) / (high - low)[:, None]
-        found, certain = _between(values[rows, first], values[rows, first + stride], parts)
-        where = np.broadcast_to(rows[:, None], inner.shape)[certain], inner[certain]
-        values[where], missing[where] = found[certain], False
-    solve(missing)
+    missing[:, _even_places(gains.shape[-1], STRIDES[0])] = False
+    values[~missing] = eigenvalues(A, M, gains, ~missing)
+    _interpolate(gains, values, missing)
+    complete(A, M, gains, values, missing)
+    values[:, 0] = pole_order(values[:, 0])
     return values
 
 
-def _open_segments(missing: BoolArray, stride: int) -> tuple[IntArray, IntArray]:
-    """Rows and first places (L,) of the segments of `stride` gains with one inside that is missing (N, K)."""
-    N, K = missing.shape
-    count = (K - 1) // stride
-    inside = missing[:, : count * stride].reshape(N, count, stride)[:, :, 1:].any(axis=-1)
-    rows, segment = np.nonzero(inside)
-    return rows, segment * stride
+def eigenvalues(A: FloatArray, M: FloatArray, gains: FloatArray, wanted: BoolArray) -> ComplexArray:
+    """Eigenvalues (L, n) of ``A - k M`` at the wanted gains (N, K), each list in `half_plane_order`."""
+    rows = np.nonzero(wanted)[0]
+    if rows.size == 0:
+        return np.empty((0, A.shape[-1]), dtype=complex)
+    closed = A[rows] - gains[wanted][:, None, None] * M[rows]
+    return half_plane_order(np.linalg.eigvals(closed).astype(complex))
 
 
-def _between(start: ComplexArray, end: ComplexArray, parts: FloatArray) -> tuple[ComplexArray, BoolArray]:
-    """Poles (L, m, n) at the `parts` (L, m) of the way from `start` to `end` (L, n), and which (L, m) are sure.
+def complete(A: FloatArray, M: FloatArray, gains: FloatArray, values: ComplexArray, missing: BoolArray) -> None:
+    """Write the missing ones (N, K) of the poles (N, K, n), with eigenvalue problems amid those that lack.
 
-    Not even tried are the segments in which a pair leaves or reaches the real axis.
+    Both ends of every row are there. `missing` is used up.
     """
-    end = np.take_along_axis(end, continuations(start, end), axis=-1)
-    # In pole order the upper one of a pair follows the lower one.
-    partner = np.arange(start.shape[-1]) + (start.imag < 0.0) - (start.imag > 0.0)
-    alike = np.all(np.take_along_axis(end, partner, axis=-1) == np.conj(end), axis=-1)
-    values = np.zeros((*parts.shape, start.shape[-1]), dtype=complex)
-    certain = np.zeros(parts.shape, dtype=bool)
-    if alike.any():
-        roots, certain[alike] = _simultaneous(start[alike], end[alike], parts[alike])
-        mirrored = np.conj(np.take_along_axis(roots, partner[alike][:, None, :], axis=-1))
-        values[alike] = 0.5 * (roots + mirrored)
-    return values, certain
+    between = _between(missing)
+    if between.place.size == 0:
+        return
+    wanted = np.zeros_like(missing)
+    length = between.right - between.left
+    inside = between.place - between.left
+    wanted.flat[between.place[(length <= FEW) | (inside % STRIDES[1] == 0)]] = True
+    values[wanted] = eigenvalues(A, M, gains, wanted)
+    missing &= ~wanted
+    _interpolate(gains, values, missing)
+    values[missing] = eigenvalues(A, M, gains, missing)
 
 
-def _simultaneous(a: ComplexArray, b: ComplexArray, t: FloatArray) -> tuple[ComplexArray, BoolArray]:
-    """Roots (L, m, n) at the parts `t` (L, m) of the way from a to b (L, n), and which of them (L, m) are sure."""
-    a, b = (np.moveaxis(v, -1, 0)[..., None] for v in (a, b))
-    s = _cubic(a, b, t)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for _ in range(ITERATIONS):
-            value = (1.0 - t) * _product(s, a) + t * _product(s, b)
-            correction = value / _others(s)
-            s = s - correction
-        squared = correction.real**2 + correction.imag**2
-        certain = np.all(squared <= SEPARATED**2 * squared_gaps(s), axis=0)
-    return np.moveaxis(s, 0, -1), certain
+def _interpolate(gains: FloatArray, values: ComplexArray, missing: BoolArray) -> None:
+    """Write what is sure of the missing poles."""
+    between = _between(missing)
+    if between.place.size == 0:
+        return
+    k, lists = gains.reshape(-1), values.reshape(-1, values.shape[-1])
+    low, high = k[between.left], k[between.right]
+    segments = Segments.between(lists[between.left[between.new]], lists[between.right[between.new]])
+    part = (k[between.place] - low) / (high - low)
+    found, sure = segments.poles(np.cumsum(between.new) - 1, part)
+    lists[between.place] = found
+    missing.flat[between.place] = ~sure
 
 
-def _cubic(a: ComplexArray, b: ComplexArray, t: FloatArray) -> ComplexArray:
-    """Cubic (n, L, m) from a to b (n, L, 1) with the true slopes at both ends, where they are not excessive."""
-    chord = b - a
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        first, last = -_product(a, b) / _others(a), _product(b, a) / _others(b)
-        first, last = (np.where(np.abs(v) <= 4.0 * np.abs(chord), v, chord) for v in (first, last))
-    return a + t * (first + t * (3.0 * chord - 2.0 * first - last + t * (first + last - 2.0 * chord)))
+class _Between(NamedTuple):
+    """Flat places (S,) of what is missing, those of the others next to it, and where a new stretch begins."""
+
+    place: IntArray
+    left: IntArray
+    right: IntArray
+    new: BoolArray
 
 
-def _product(s: ComplexArray, zeros: ComplexArray) -> ComplexArray:
-    """``prod_j (s - zeros_j)``: s (n, L, m), zeros (n, L, 1)."""
-    result: ComplexArray = np.subtract(s, zeros[0])
-    factor = np.empty_like(result)
-    for zero in zeros[1:]:
-        np.subtract(s, zero, out=factor)
-        np.multiply(result, factor, out=result)
-    return result
+def _between(missing: BoolArray) -> _Between:
+    there = ~missing.reshape(-1)
+    others = np.flatnonzero(there)
+    place = np.flatnonzero(missing)
+    after = np.cumsum(there)[place]
+    new = np.ones(place.size, dtype=bool)
+    np.not_equal(after[1:], after[:-1], out=new[1:])
+    return _Between(place, others[after - 1], others[np.minimum(after, others.size - 1)], new)
 
 
-def _others(s: ComplexArray) -> ComplexArray:
-    """``prod_(j != i) (s_i - s_j)``, the shape of s, (n, ...)."""
-    product = np.ones_like(s)
-    for i in range(len(s)):
-        for j in range(i):
-            apart = s[i] - s[j]
-            product[i] *= apart
-            product[j] *= apart
-        # s_i is yet to meet the later roots, each time with the other sign.
-        if (len(s) - 1 - i) % 2:
-            np.negative(product[i], out=product[i])
-    return product
+def _even_places(count: int, stride: int) -> IntArray:
+    """Both ends of `count` places and some in between, `stride` apart at most and evenly."""
+    parts = -(-(count - 1) // stride)
+    return np.arange(parts + 1) * (count - 1) // parts

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.frequency.crossovers import Crossings, critical_ratio, gain_crossings, phase_crossings
+from design.frequency.delayed import grid_response
 from design.frequency.feedback import ClosedLoop, closed_loop, log_slope, open_loop_value
 from design.frequency.peaks import peaks
 from design.loop import SisoLoop
-from model.arrays import BoolArray, FloatArray, GridArrays
+from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays
 
 TURN = 2.0 * np.pi
+#: Points that are searched at a time: each takes some hundred kilobytes.
+BLOCK = 128
+#: With this many states the response by polynomials is still good to seven digits.
+LARGEST = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +32,8 @@ class Margins(GridArrays):
     ----------
     gain_ratio, gain_omega : (*G, M) every gain, over the gain flown, that puts a closed-loop pole on the
         axis, and its frequency [rad/s], 0 included. A ratio of 0 (the open loop's own poles on the axis) is
-        no margin, nor is one beyond 120 dB. M is n; with a delay it is 16, those nearest to the gain flown,
-        and 60 dB is the most they are looked for
+        no margin, nor is one beyond 120 dB. M is n, of a sampled loop n + 1; with a delay, or more than 20 states,
+        it is 16, those nearest to the gain flown, and 60 dB is the most they are looked for
     gain_margin_up_db : (*G,) smallest raise that destabilises [dB], positive; inf when none does
     gain_margin_down_db : (*G,) smallest reduction that destabilises [dB], negative; -inf when none does
     phase, phase_omega : (*G, n) phase margin at every gain crossover [rad], in (-pi, pi], and its frequency
@@ -63,35 +68,60 @@ def margins(loop: SisoLoop) -> Margins:
 
     Raises
     ------
-    ValueError : the delay is negative
+    ValueError : the delay is negative, or there are more states than `LARGEST`
     numpy.linalg.LinAlgError : an entry is not finite
     """
     if loop.delay < 0.0:
         raise ValueError(f"delay must not be negative, is {loop.delay} s")
-    closed = closed_loop(loop)
-    gain, unity = phase_crossings(closed), gain_crossings(closed)
-    ratio, peak = critical_ratio(gain.value), peaks(closed)
-    phase = _phase(closed, unity)
+    return margins_of(closed_loop(loop), loop.gain.shape)
+
+
+def margins_of(closed: ClosedLoop, shape: tuple[int, ...]) -> Margins:
+    """Margins of a closed loop whose points, in one row, are those of a grid of that shape.
+
+    Raises
+    ------
+    ValueError : there are more states than `LARGEST`
+    numpy.linalg.LinAlgError : an entry is not finite
+    """
+    if closed.matrix.shape[-1] > LARGEST:
+        raise ValueError(f"margins are good for {LARGEST} states at most, there are {closed.matrix.shape[-1]}")
+    N = closed.scale.size
+    if closed.searched and N > BLOCK:
+        parts = [_margins(closed.take(slice(i, i + BLOCK))) for i in range(0, N, BLOCK)]
+        values = [np.concatenate(each) for each in zip(*parts, strict=True)]
+    else:
+        values = _margins(closed)
+    return Margins(*(v.reshape((*shape, *v.shape[1:])) for v in values))
+
+
+def _margins(closed: ClosedLoop) -> list[FloatArray]:
+    """What `Margins` holds, for points in one row."""
+    loop = closed.quietened(closed.regular if closed.delayed else closed.stable)
+    found = grid_response(loop) if loop.searched else None
+    gain, unity = phase_crossings(loop, found), gain_crossings(loop, found)
+    ratio, peak = critical_ratio(gain.value), peaks(loop, closed.poles, found)
+    phase, phase_omega = _phase(loop, unity), loop.frequency(unity.omega)
     # Where there is no crossover the column picked is nan, and says so.
     nearest = np.argmin(_without_nan(np.abs(phase)), axis=-1)[:, None]
-    phase_margin, crossover = (np.take_along_axis(v, nearest, axis=-1)[:, 0] for v in (phase, unity.omega))
-    values: tuple[FloatArray, ...] = (
+    phase_margin, crossover = (np.take_along_axis(v, nearest, axis=-1)[:, 0] for v in (phase, phase_omega))
+    values: list[FloatArray] = [
         ratio,
-        gain.omega * closed.scale[:, None],
+        loop.frequency(gain.omega),
         _decibels(np.where(ratio > 1.0, ratio, np.inf).min(axis=-1)),
         _decibels(np.where(ratio < 1.0, ratio, 0.0).max(axis=-1)),
         phase,
-        unity.omega * closed.scale[:, None],
+        phase_omega,
         _without_nan(np.abs(phase_margin)),
-        crossover * closed.scale,
-        _without_nan((phase % TURN) / unity.omega).min(axis=-1) / closed.scale,
+        crossover,
+        _without_nan((phase % TURN) / phase_omega).min(axis=-1),
         2.0 / peak.balanced,
         peak.sensitivity,
-    )
-    stable = _stable(closed, unity)
+    ]
+    stable = closed.regular & _stable(loop, closed.poles, unity) if closed.delayed else closed.stable
     if not stable.all():
-        values = tuple(_where(stable, v) for v in values)
-    return Margins(*(v.reshape((*loop.gain.shape, *v.shape[1:])) for v in values))
+        values = [_where(stable, v) for v in values]
+    return values
 
 
 def _phase(closed: ClosedLoop, unity: Crossings) -> FloatArray:
@@ -100,8 +130,8 @@ def _phase(closed: ClosedLoop, unity: Crossings) -> FloatArray:
     return np.asarray(np.angle(-open_loop_value(unity.value) * turn))
 
 
-def _stable(closed: ClosedLoop, unity: Crossings) -> BoolArray:
-    """Mask (N,) of the points whose closed loop is stable with its delay.
+def _stable(closed: ClosedLoop, poles: ComplexArray, unity: Crossings) -> BoolArray:
+    """Mask (N,) of the points whose closed loop is stable with its delay; without it its poles are at `poles` (N, n).
 
     As the delay grows from 0, closed-loop poles meet the axis only at the gain crossovers, each time the
     delay has used up the phase there: they leave to the right where ``|L|`` falls with frequency, and come
@@ -112,8 +142,7 @@ def _stable(closed: ClosedLoop, unity: Crossings) -> BoolArray:
     lag = np.angle(-open_loop_value(T)) % TURN
     visits = np.floor((omega * closed.delay[:, None] - lag) / TURN) + 1.0
     pairs = np.where(np.isnan(omega), 0.0, falling * np.maximum(visits, 0.0)).sum(axis=-1)
-    right = (closed.poles.real > 0.0).sum(axis=-1) + 2.0 * pairs
-    return np.asarray(closed.regular & (right == 0.0))
+    return np.asarray((poles.real > 0.0).sum(axis=-1) + 2.0 * pairs == 0.0)
 
 
 def _without_nan(values: FloatArray) -> FloatArray:

@@ -44,10 +44,11 @@ def with_derivatives(p: FloatArray) -> FloatArray:
 
 
 def powers(x: FloatArray, length: int) -> FloatArray:
-    """``x^(length-1) .. x, 1`` (*G, length): times the coefficients and summed, the value of a polynomial."""
-    factors = np.ones((*x.shape, length))
-    factors[..., 1:] = x[..., None]
-    return np.multiply.accumulate(factors, axis=-1)[..., ::-1]
+    """``x^(length-1) .. x, 1`` of (K,), (length, K): times the coefficients and summed, the value of a polynomial."""
+    factors = np.empty((length, *x.shape))
+    factors[0] = 1.0
+    factors[1:] = x
+    return np.multiply.accumulate(factors, axis=0)[::-1]
 
 
 def magnitude_bound(p: FloatArray, s: ComplexArray | FloatArray) -> FloatArray:
@@ -72,7 +73,7 @@ def imaginary_cross(p: FloatArray, q: FloatArray) -> FloatArray:
 
 def _bilinear(p: FloatArray, q: FloatArray, table: FloatArray) -> FloatArray:
     products = p[..., :, None] * q[..., None, :]
-    return np.asarray(products.reshape(*products.shape[:-2], -1) @ table)
+    return np.asarray(products.reshape(*products.shape[:-2], len(table)) @ table)
 
 
 @cache

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.frequency.polynomials import leading_zeros, roots, with_roots
+from design.frequency.staircase import balanced, integrations, polynomials, staircase
 from model.arrays import ComplexArray, FloatArray, GridArrays, IntArray
 
 
@@ -43,16 +44,22 @@ class Transfer(GridArrays):
 
 
 def transfer(A: FloatArray, b: FloatArray, c: FloatArray) -> Transfer:
-    """``c (sI - A)^-1 b`` from the poles without and with feedback of the `natural_gain`.
+    """``c (sI - A)^-1 b`` by `design.frequency.staircase`.
 
     Parameters
     ----------
     A : (*G, n, n), b : (*G, n), c : (*G, n), finite
     """
-    poles = np.linalg.eigvals(A).astype(complex)
-    gain = natural_gain(A, b, c, poles)
-    moved = np.linalg.eigvals(A - gain[..., None, None] * b[..., :, None] * c[..., None, :])
-    return transfer_of_poles(poles, moved.astype(complex), gain, markov_parameters(A, b, c))
+    n = A.shape[-1]
+    system = balanced(
+        np.ascontiguousarray(A.reshape(-1, n * n).T).reshape(n, n, -1),
+        np.ascontiguousarray(b.reshape(-1, n).T),
+        np.ascontiguousarray(c.reshape(-1, n).T),
+    )
+    numerator, denominator = polynomials(staircase(*system))
+    numerator[1:][np.arange(n)[:, None] < integrations(*system)] = 0.0
+    shape = (*b.shape[:-1], n + 1)
+    return Transfer(numerator.T.reshape(shape), denominator.T.reshape(shape))
 
 
 def natural_gain(A: FloatArray, b: FloatArray, c: FloatArray, poles: ComplexArray) -> FloatArray:

@@ -9,7 +9,7 @@ energies are integrals of the polynomials through the samples of the graded mesh
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -43,8 +43,9 @@ class ActuatorDemand(GridArrays):
     energy_out : work of the actuator on the surface while its power is positive [J], >= 0
     energy_back : work of the surface on the actuator while its power is negative [J], >= 0
 
-    Where the deflection itself jumps at t = 0, peak rate, acceleration and power are inf. A loop that leaves
-    the range of doubles has inf or nan.
+    Where the deflection itself jumps at t = 0, peak rate, acceleration and power are inf. Where a loop has no torque
+    among its outputs because it is not finite (an ideal deflection), torque and power are inf, and the energies and
+    the holding torque nan. A loop that leaves the range of doubles has inf or nan.
     """
 
     peak_torque: FloatArray
@@ -83,7 +84,7 @@ def actuator_demands(loop: Loop, response: Response, actuators: tuple[str, ...])
 
     Raises
     ------
-    ValueError : no such actuator, or the loop lacks its torque, rate or deflection among the outputs
+    ValueError : no such actuator, or the loop lacks its rate or deflection among the outputs
     """
     rows = _output_indices(response, actuators)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -94,7 +95,7 @@ def actuator_demands(loop: Loop, response: Response, actuators: tuple[str, ...])
         jumps = np.abs(signals[..., :3, 0, 0] - loop.offset[..., rows]) > _JUMP * peaks[..., :3]
     angle_jumps, rate_jumps = jumps[..., _DEFLECTION], jumps[..., _RATE] | jumps[..., _DEFLECTION]
     holding = np.abs(response.final_outputs[..., rows[:, _TORQUE]])
-    return tuple(
+    demands = (
         ActuatorDemand(
             peak_torque=peaks[..., i, _TORQUE],
             rms_torque=np.sqrt(squares[..., i, 0]),
@@ -109,15 +110,37 @@ def actuator_demands(loop: Loop, response: Response, actuators: tuple[str, ...])
         )
         for i in range(len(actuators))
     )
+    has_torque = [_torque_name(name) in response.names for name in actuators]
+    return tuple(d if finite else _without_torque(d) for d, finite in zip(demands, has_torque, strict=True))
+
+
+def _without_torque(demand: ActuatorDemand) -> ActuatorDemand:
+    """The demand on an actuator whose torque is not finite."""
+    unlimited, unknown = (np.full(demand.peak_rate.shape, value) for value in (np.inf, np.nan))
+    return replace(
+        demand, peak_torque=unlimited, rms_torque=unlimited, peak_power=unlimited, rms_power=unlimited,
+        peak_acceleration=unlimited, holding_torque=unknown, energy_out=unknown, energy_back=unknown,
+    )  # fmt: skip
 
 
 def _output_indices(response: Response, actuators: tuple[str, ...]) -> IntArray:
-    """(a, 3) indices of each actuator's torque, rate and deflection among the outputs."""
+    """(a, 3) indices of each actuator's torque, rate and deflection among the outputs.
+
+    The rate stands in for a torque that is not there.
+    """
     unknown = [name for name in actuators if name not in _LETTERS]
     if unknown:
         raise ValueError(f"no actuator {unknown[0]!r}; there are {', '.join(_LETTERS)}")
-    names = [[f"T_{_LETTERS[a]}", f"d{_LETTERS[a]}_rate", f"d{_LETTERS[a]}"] for a in actuators]
-    return np.array([[response.index(name) for name in triple] for triple in names], dtype=np.int64)
+    indices = []
+    for actuator in actuators:
+        angle, torque = f"d{_LETTERS[actuator]}", _torque_name(actuator)
+        rate = response.index(f"{angle}_rate")
+        indices.append([response.index(torque) if torque in response.names else rate, rate, response.index(angle)])
+    return np.array(indices, dtype=np.int64)
+
+
+def _torque_name(actuator: str) -> str:
+    return f"T_{_LETTERS[actuator]}"
 
 
 def _signals(response: Response, indices: IntArray) -> FloatArray:

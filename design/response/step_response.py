@@ -88,7 +88,7 @@ def step_response(loop: Loop, reference: FloatArray, duration: float, samples: i
     duration : length of the response [s]
     samples : number of samples T, both ends included
 
-    Transport delays (``loop.delay``) are in the margins, not in this response.
+    Transport delays (``loop.delay``) are left out; `design.delay.step_response` has them.
 
     Returns
     -------

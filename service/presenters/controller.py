@@ -9,7 +9,9 @@ import numpy as np
 from design.frequency.margins import Margins
 from design.response.step_metrics import StepMetrics
 from design.specs import Verdict
-from schedules.run import DesignedController
+from schedules.designed import DesignedController
+from service.presenters.disturbance import disturbance_documents
+from service.presenters.infeasibility import infeasibility_document
 from service.presenters.riccati import riccati_document
 from service.spec_names import spec_field
 
@@ -38,19 +40,27 @@ def controller_document(controller: DesignedController, index: tuple[int, ...]) 
         "kind": controller.request.kind,
         "outcome": controller.outcomes.codes[index],
         "reason": controller.outcomes.reasons[index],
+        "infeasibility": _infeasibility(controller, index),
         "gains": [{"name": g.name, "unit": g.unit, "value": g.values[index]} for g in controller.gains],
     }
     assessment = controller.assessment
     if assessment is None or not controller.outcomes.ok[index]:
-        return document | {"poles": None, "margins": None, "step": None, "riccati": None, "verdicts": []}
+        nothing = dict.fromkeys(("poles", "margins", "step", "disturbance", "riccati"))
+        return document | nothing | {"verdicts": []}
     here = assessment.take(index)
     return document | {
-        "poles": here.poles,
+        "poles": here.poles[np.isfinite(here.poles)],
         "margins": {name: margins_document(m) for name, m in zip(here.actuators, here.margins, strict=True)},
         "step": step_document(here.step),
+        "disturbance": disturbance_documents(controller.loop.take(index)),
         "riccati": None if controller.riccati is None else riccati_document(controller.riccati, index),
         "verdicts": [verdict_at(verdict, index) for verdict in controller.verdicts],
     }
+
+
+def _infeasibility(controller: DesignedController, index: tuple[int, ...]) -> dict[str, Any] | None:
+    found = None if controller.infeasibility is None else controller.infeasibility[index]
+    return None if found is None else infeasibility_document(found)
 
 
 def margins_document(margins: Margins) -> dict[str, Any]:
@@ -106,9 +116,10 @@ def verdict_at(verdict: Verdict, index: tuple[int, ...]) -> dict[str, Any]:
     field = spec_field(verdict.spec.quantity, verdict.spec.sense)
     return {
         "spec": field.name,
-        "limit": field.limit(verdict.spec),
+        "limit": field.limit_at(verdict.spec, index),
         "unit": field.unit,
         "source": verdict.spec.source,
         "value": field.value(float(verdict.values[index])),
+        "distance": field.value(float(verdict.distance[index])),
         "passed": bool(verdict.passed[index]),
     }

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from design.gains import Gain
 from design.specs import Verdict
+from model.flight import GridAxis
+from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.files import FILE_FORMATS
-from schedules.run import DesignedController, DesignedEnvelope
+from service.presenters.gain_tables import gain_document, smoothing_document
 from service.presenters.grid import air_document, grid_document, outcome_documents, warning_documents
 from service.presenters.hinge_moments import fit_document
-from service.spec_names import spec_field
+from service.spec_names import SpecField, spec_field
 from service.version import code_version, solver
 
 
@@ -30,34 +31,34 @@ def design_document(ident: str, request: dict[str, Any], created_at: str, envelo
         "reasons": plant.outcomes.reasons,
         "warnings": warning_documents(envelope.warnings),
         "hinge_moment_fit": fit_document(plant.system.aerodynamics.source),
-        "controllers": [_controller(controller) for controller in envelope.controllers],
+        "controllers": [_controller(controller, plant.grid.axes) for controller in envelope.controllers],
         "links": links(ident, [controller.request.name for controller in envelope.controllers]),
     }
 
 
-def _controller(controller: DesignedController) -> dict[str, Any]:
+def _controller(controller: DesignedController, axes: tuple[GridAxis, ...]) -> dict[str, Any]:
     return {
         "name": controller.request.name,
         "kind": controller.request.kind,
         **outcome_documents(controller.outcomes),
-        "gains": [_gain(gain) for gain in controller.gains],
+        "gains": [gain_document(gain, axes) for gain in controller.gains],
+        "smoothing": smoothing_document(controller.smoothed),
         "reduced_frequency": controller.reduced_frequency,
         "verdicts": [verdict_over_grid(verdict) for verdict in controller.verdicts],
     }
 
 
-def _gain(gain: Gain) -> dict[str, Any]:
-    return {"name": gain.name, "unit": gain.unit, "values": gain.values}
-
-
 def verdict_over_grid(verdict: Verdict) -> dict[str, Any]:
-    """A spec, its worst value over the points that carry a design, and whether all of them meet it."""
+    """A spec, its worst value over the points that carry a design, and whether all of them meet it.
+
+    The limit of a spec that varies over the grid is the one at the worst point.
+    """
     field = spec_field(verdict.spec.quantity, verdict.spec.sense)
     worst = verdict.worst
     value = None if worst is None else _finite(field.value(float(verdict.values.flat[worst])))
     return {
         "spec": field.name,
-        "limit": field.limit(verdict.spec),
+        "limit": field.limit(verdict.spec) if worst is None else _limit_at(field, verdict, worst),
         "unit": field.unit,
         "source": verdict.spec.source,
         "worst_value": value,
@@ -67,6 +68,10 @@ def verdict_over_grid(verdict: Verdict) -> dict[str, Any]:
         "passed": worst is not None and bool(np.all(verdict.passed[verdict.judged])),
         "reason": _why_no_value(worst, value, verdict),
     }
+
+
+def _limit_at(field: SpecField, verdict: Verdict, point: int) -> float:
+    return field.limit_at(verdict.spec, tuple(int(i) for i in np.unravel_index(point, verdict.values.shape)))
 
 
 def _why_no_value(worst: int | None, value: float | None, verdict: Verdict) -> str | None:
@@ -96,7 +101,11 @@ def links(ident: str, controllers: list[str]) -> dict[str, Any]:
         "points": f"{here}/points/{{index}}",
         "root_locus": each("root-locus"),
         "response": each("response"),
+        "frequency_response": each("frequency-response"),
         "actuator_requirements": each("actuator-requirements"),
+        "verdicts": each("verdicts"),
+        "design_margin": each("design-margin"),
+        "scaling": each("scaling"),
         "gains": each("gains"),
         "schedules": {
             name: {suffix: f"{here}/schedules/{name}.{suffix}" for suffix in FILE_FORMATS} for name in controllers

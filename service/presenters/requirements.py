@@ -9,7 +9,7 @@ import numpy as np
 from design.response.demand import ActuatorDemand
 from model.actuators import Actuator
 from model.arrays import FloatArray
-from schedules.run import DesignedController, DesignedEnvelope
+from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.study import Reference
 from service.presenters.grid import grid_document, outcome_documents
 

@@ -4,32 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from design.response.step_response import Response
 from schedules.wire_names import wire_name
-
-#: Output of a loop -> its unit inside; angles are turned to degrees.
-_UNITS = {
-    "da": "rad",
-    "dt": "rad",
-    "da_rate": "rad/s",
-    "dt_rate": "rad/s",
-    "dt_command": "rad",
-    "T_t": "N m",
-    "T_a": "N m",
-}
-_DEGREES = {"rad": "deg", "rad/s": "deg/s"}
+from service.signal_units import signal_unit
 
 
 def response_document(response: Response) -> dict[str, Any]:
     """Response at one point; totals, trim values included."""
     signals, units = {}, {}
     for column, name in enumerate(response.names):
-        unit = _UNITS[name]
-        values = response.outputs[:, column]
-        if unit in _DEGREES:
-            unit, values = _DEGREES[unit], np.rad2deg(values)
-        signals[wire_name(name, unit)] = values
+        unit, size = signal_unit(name, {})
+        signals[wire_name(name, unit)] = response.outputs[:, column] * size
         units[wire_name(name, unit)] = unit
     return {"time_s": response.time, "signals": signals, "units": units}

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from design.frequency.loci import RootLocus
+from design.frequency.locus_damping import DampingGains
+from model.arrays import ComplexArray, FloatArray
 
 
-def root_locus_document(locus: RootLocus) -> dict[str, Any]:
-    """Branches ``[pole][k]`` over the gains, and the places that tell the locus's shape."""
+def root_locus_document(locus: RootLocus, damped: DampingGains, damping_ratio: float) -> dict[str, Any]:
+    """Branches ``[pole][k]`` over the gains, the places that tell their shape, and the gains of a damping ratio."""
     return {
         "sign": locus.sign,
         "gains": locus.gains,
@@ -30,4 +32,26 @@ def root_locus_document(locus: RootLocus) -> dict[str, Any]:
             "centroid": locus.asymptote_centroid,
             "angles_deg": np.rad2deg(locus.asymptote_angles[np.isfinite(locus.asymptote_angles)]),
         },
+        "departures": _angles(locus.branches[:, 0], locus.departure_angles),
+        "arrivals": _angles(locus.zeros, locus.arrival_angles),
+        "constant_damping": {
+            "damping_ratio": damping_ratio,
+            "gains": [
+                {"gain": gain, "omega_n_rad_s": omega}
+                for gain, omega in zip(damped.gains.tolist(), damped.natural_frequency.tolist(), strict=True)
+                if np.isfinite(gain)
+            ],
+            "least_damping_ratio": damped.least_damping_ratio,
+            "lowest_gain": damped.lowest_gain,
+            "largest_gain": damped.largest_gain,
+        },
     }
+
+
+def _angles(points: ComplexArray, angles: FloatArray) -> list[dict[str, Any]]:
+    """Points with the directions in which branches leave or reach them; those that no branch does are left out."""
+    return [
+        {"at": {"re": point.real, "im": point.imag}, "angle_deg": float(np.rad2deg(angle))}
+        for point, angle in zip(points.tolist(), angles.tolist(), strict=True)
+        if np.isfinite(angle)
+    ]

@@ -6,12 +6,14 @@ from service.routes import (
     designs,
     eigenvalue_sweeps,
     examples,
+    frequency_response,
     hinge_moments,
     linear_models,
     meta,
     points,
     root_locus,
     similarity,
+    spec_packs,
     steady_state_maps,
 )
 from service.routes import schedules as schedule_files
@@ -22,6 +24,7 @@ ROUTERS = (
     points.router,
     root_locus.router,
     controllers.router,
+    frequency_response.router,
     schedule_files.router,
     linear_models.router,
     eigenvalue_sweeps.router,
@@ -29,6 +32,7 @@ ROUTERS = (
     similarity.router,
     hinge_moments.router,
     atmosphere.router,
+    spec_packs.router,
     examples.router,
     meta.router,
 )

@@ -1,4 +1,4 @@
-"""One controller of a design: root locus, step response, actuator requirements, gains between the grid points."""
+"""One controller of a design: step response, actuator requirements, verdicts, gains between the grid points."""
 
 from __future__ import annotations
 
@@ -8,22 +8,28 @@ import numpy as np
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from design.response.step_response import step_response
+from design.classical.controller import ClassicalController
+from design.delay.step_response import delayed_step_response
+from schedules.designed import DesignedEnvelope
 from schedules.interpolate import interpolate
-from schedules.run import DesignedEnvelope
+from schedules.run import design_margins
 from schedules.schedule_of import schedule_of
 from schedules.wire_names import axis_name
 from service.answering import answer, encode
 from service.designs import controller_of, point_with_gains
 from service.limits import check_size
 from service.openapi import problems
+from service.presenters.design_margin import design_margin_document
 from service.presenters.gains import gains_document
 from service.presenters.requirements import reference_document, requirements_document
 from service.presenters.response import response_document
+from service.presenters.scaling import scaling_document
+from service.presenters.verdicts import verdicts_document
 from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.designs import DesignId
-from service.schemas.controller_answers import InterpolatedGains, Requirements
+from service.schemas.controller_answers import DesignMargin, InterpolatedGains, Requirements, Verdicts
 from service.schemas.controller_answers import Response as StepResponse
+from service.schemas.scaling_answers import Scaling
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere, SettingsHere
 from service.units import unit_of
@@ -74,7 +80,7 @@ def response(
     index = point_with_gains(envelope, controller, wanted.point)
     reference = envelope.study.reference
     duration = wanted.duration_s or reference.duration
-    found = step_response(controller.loop.take(index), np.array([reference.aileron]), duration, wanted.samples)
+    found = delayed_step_response(controller.loop.take(index), np.array([reference.aileron]), duration, wanted.samples)
     document = {"name": name, "point": wanted.point, "kind": wanted.kind}
     return answer(request, encode(document | reference_document(reference, duration) | response_document(found)))
 
@@ -89,6 +95,33 @@ def actuator_requirements(request: Request, ident: DesignId, name: ControllerNam
     """What the reference step asks of each actuator: torque, rate, power and energy over the grid, and the worst."""
     envelope = designs.envelope(ident)
     return answer(request, encode(requirements_document(envelope, controller_of(envelope, name))))
+
+
+@router.get("/verdicts", response_model=Verdicts, responses=problems(404, 409, 503), dependencies=[HEAVY])
+def verdicts(request: Request, ident: DesignId, name: ControllerName, designs: DesignsHere) -> Response:
+    """Every spec at every point: limit, value, distance and verdict, and where each is worst."""
+    envelope = designs.envelope(ident)
+    return answer(request, encode(verdicts_document(envelope, controller_of(envelope, name))))
+
+
+@router.get("/design-margin", response_model=DesignMargin, responses=problems(404, 409, 422, 503), dependencies=[HEAVY])
+def design_margin(request: Request, ident: DesignId, name: ControllerName, designs: DesignsHere) -> Response:
+    """By how much all specs of a tab-only controller could be stricter at each point: the design margin."""
+    envelope = designs.envelope(ident)
+    asked = controller_of(envelope, name).request
+    if not isinstance(asked, ClassicalController) or not asked.specs or asked.all_gains_given:
+        allowed = "a tab-only controller whose gains are chosen by specs"
+        detail = f"the controller {name} has no specs that its gains are chosen by"
+        raise InvalidRequest(f"/name: {detail}", FieldRefusal("/name", detail, None, allowed))
+    found = design_margins(envelope.study, envelope.plant, asked)
+    return answer(request, encode(design_margin_document(envelope, asked, found)))
+
+
+@router.get("/scaling", response_model=Scaling, responses=problems(404, 409, 503), dependencies=[HEAVY])
+def scaling(request: Request, ident: DesignId, name: ControllerName, designs: DesignsHere) -> Response:
+    """The gains as powers of dynamic pressure and mass flux, what such a schedule loses, and scaled poles."""
+    envelope = designs.envelope(ident)
+    return answer(request, encode(scaling_document(envelope, controller_of(envelope, name))))
 
 
 @router.get("/gains", response_model=InterpolatedGains, responses=problems(404, 409, 422, 503), dependencies=[HEAVY])

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, Field
 
 from design.frequency.loci import root_locus
+from design.frequency.locus_damping import gain_at_damping
 from design.loop import Loop, SisoLoop
 from service.answering import answer, encode
 from service.designs import controller_of, point_with_gains
@@ -35,6 +36,9 @@ class WantedLocus(BaseModel):
         description="Gain whose locus is wanted, in the order of closure `K_d`, `K_p`, `K_i` (or `K_f`, `K_i`), or the "
         "actuator input `tab` or `aileron` at which the whole loop is opened; without it, the loop closed first",
     )
+    damping_ratio: Annotated[float, Field(ge=0.01, le=0.99)] = Field(
+        default=0.5, description="Damping ratio whose gains are wanted"
+    )
     count: Annotated[int, Field(ge=100)] = Field(default=300, description="How many gains, 0 included")
 
 
@@ -54,7 +58,8 @@ def root_locus_of_controller(
     index = point_with_gains(envelope, controller, wanted.point)
     loop = _loop(controller.loop.take(index), wanted.loop)
     document = {"name": name, "loop": loop.name, "loops": _loop_names(controller.loop), "point": wanted.point}
-    return answer(request, encode(document | root_locus_document(root_locus(loop, count=wanted.count))))
+    locus, damped = root_locus(loop, count=wanted.count), gain_at_damping(loop, wanted.damping_ratio)
+    return answer(request, encode(document | root_locus_document(locus, damped, wanted.damping_ratio)))
 
 
 def _loop_names(loop: Loop) -> list[str]:

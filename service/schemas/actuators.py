@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from service.schemas.wire import Request
+from service.schemas.wire import Request, refusal
 
 Bandwidth = Annotated[float, Field(ge=1e-3, le=1e4)]
 Ideal = Annotated[float, Field(ge=0.0, le=0.0)]
@@ -30,23 +30,39 @@ class AileronActuator(Request):
 
 
 class TabActuator(Request):
-    """The tab's actuator, commanded by deflection (servo) or by torque."""
+    """The tab's actuator, commanded by deflection (servo), by rate or by torque."""
 
     servo_bandwidth_hz: Bandwidth | None = Field(
         default=None,
-        description="Natural frequency of the second-order deflection servo; needed by controllers that command "
-        "a tab deflection",
+        description="Natural frequency of the deflection servo, its corner when it is of first order; null: ideal, "
+        "for controllers whose gains are all given",
         examples=[40.0],
     )
     servo_damping_ratio: Annotated[float, Field(ge=0.05, le=10.0)] | None = Field(
-        default=None, description="Damping ratio of the deflection servo", examples=[0.7]
+        default=None, description="Damping ratio of the deflection servo; null: it is of first order", examples=[0.7]
     )
     rate_loop_bandwidth_hz: Bandwidth | None = Field(
-        default=None, description="Bandwidth of the rate loop, for controllers that command a tab rate"
+        default=None,
+        description="Bandwidth of the rate loop, for controllers that command a tab rate; null: ideal, where K_theta "
+        "is given or the actuator has a delay",
     )
     torque_loop_bandwidth_hz: None = Field(default=None, description="This version: null, an ideal torque loop")
-    delay_s: Ideal = Field(default=0.0, description="Transport delay of the command; this version: none")
+    delay_s: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        default=0.0,
+        description="Transport delay of the command. This version designs state feedback (`lqr`) without one",
+    )
     limits: Limits = Field(default_factory=Limits)
+
+    @model_validator(mode="after")
+    def damping_of_a_servo(self) -> Self:
+        """Refuse the damping ratio of a servo that is ideal."""
+        if self.servo_damping_ratio is not None and self.servo_bandwidth_hz is None:
+            raise refusal(
+                "the servo has no bandwidth, so it is ideal and has no damping ratio",
+                "null, or servo_bandwidth_hz beside it",
+                at="/servo_damping_ratio",
+            )
+        return self
 
 
 class Actuators(Request):

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from service.schemas.design import Grid, GridNumbers, GridOutcomes, GridReasons, Kind
+from service.schemas.design import Gain, Grid, GridNumbers, GridOutcomes, GridReasons, Kind, Verdict
 from service.schemas.point import Complex
 from service.schemas.wire import Answer
 
@@ -32,6 +32,34 @@ class Asymptotes(Answer):
     angles_deg: list[float]
 
 
+class BranchAngle(Answer):
+    """Direction in which a branch leaves a pole, or reaches a zero."""
+
+    at: Complex
+    angle_deg: float
+
+
+class DampingGain(Answer):
+    """A gain at which a pole has the damping ratio, and the distance of that pole from the origin."""
+
+    gain: float
+    omega_n_rad_s: float
+
+
+class ConstantDamping(Answer):
+    """Gains at which a pole lies on the ray of a damping ratio, and the interval about the chosen gain that has it.
+
+    The interval holds the gains about the chosen one at which all poles have the damping ratio at least; null where the
+    chosen one has not, or where there is no end.
+    """
+
+    damping_ratio: float
+    gains: list[DampingGain]
+    least_damping_ratio: float | None = Field(description="At the chosen gain")
+    lowest_gain: float | None
+    largest_gain: float | None
+
+
 class RootLocus(Answer):
     """The roots of ``1 + sign k L(s)`` as the gain k grows; each branch is continuous in k."""
 
@@ -46,6 +74,9 @@ class RootLocus(Answer):
     crossings: list[Crossing]
     breakaways: list[Breakaway]
     asymptotes: Asymptotes
+    departures: list[BranchAngle] = Field(description="From the open loop's poles")
+    arrivals: list[BranchAngle] = Field(description="At the finite zeros")
+    constant_damping: ConstantDamping
 
 
 class Response(Answer):
@@ -111,6 +142,42 @@ class Requirements(Answer):
     actuators: dict[str, Demand]
     envelope: dict[str, dict[str, Worst]]
     limits: dict[str, Limits]
+
+
+class SpecVerdict(Verdict):
+    """A spec at every point of the grid: arrays in its shape, null where the point carries no design."""
+
+    limits: GridNumbers = Field(json_schema_extra={"unit": "see `unit`"})
+    values: GridNumbers = Field(json_schema_extra={"unit": "see `unit`"})
+    distances: GridNumbers = Field(
+        json_schema_extra={"unit": "see `unit`"}, description="How far inside the limit; negative outside"
+    )
+    passes: list[list[bool | None]]
+
+
+class Verdicts(Answer):
+    """Every spec of the request, of the spec pack and of the actuators' limits, at every point."""
+
+    name: str
+    kind: Kind
+    grid: Grid
+    outcomes: GridOutcomes
+    reasons: GridReasons
+    verdicts: list[SpecVerdict]
+
+
+class DesignMargin(Answer):
+    """By how many per cent of its limit each spec can be stricter, all together, and still be met; or must be laxer."""
+
+    name: str
+    kind: Kind
+    grid: Grid
+    outcomes: GridOutcomes
+    reasons: GridReasons
+    margin_percent: GridNumbers
+    binding: list[list[str | None]] = Field(description="Spec that is in the way first")
+    worst: Worst | None = Field(description="The smallest margin: what the whole grid has")
+    gains: list[Gain] = Field(description="That reach the margin")
 
 
 class InterpolatedGains(Answer):

@@ -2,50 +2,140 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from service.schemas.actuators import Bandwidth
+from service.schemas.given_gains import Gains, NegativeFeedbackGains, NoneGivenIsNull, PositiveFeedbackGains
+from service.schemas.grid_values import GridAxes, fields_on_grid
+from service.schemas.specs import Specs
 from service.schemas.weights import BrysonWeights, ExplicitWeights
-from service.schemas.wire import Request
+from service.schemas.wire import Request, refusal
 
 ControllerName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,62}$")]
 Weights = Annotated[BrysonWeights | ExplicitWeights, Field(discriminator="rule")]
 
+#: Longest computational delay, in samples.
+MOST_DELAY = 10.0
 
-class Specs(Request):
-    """What a classical design must meet. A spec that is not given is not imposed; the spec pack is still judged."""
 
-    damping_ratio_min: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
-    gain_margin_db_min: Annotated[float, Field(ge=0.0, le=60.0)] | None = None
-    phase_margin_deg_min: Annotated[float, Field(ge=0.0, le=90.0)] | None = None
-    settling_time_s_max: Annotated[float, Field(ge=1e-4, le=1e3)] | None = None
-    overshoot_percent_max: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
+class Smoothing(Request):
+    """How much may be given up so that gains vary smoothly over the grid."""
+
+    bandwidth_loss_percent_max: Annotated[float, Field(ge=0.0, le=50.0)] = Field(
+        description="Largest part of its bandwidth that any point may lose"
+    )
+
+
+def null_when_nothing_is_given_up(smoothing: Smoothing | None) -> Smoothing | None:
+    """The smoothing, or None when it may lose nothing: both are the same request."""
+    return smoothing if smoothing is not None and smoothing.bandwidth_loss_percent_max > 0.0 else None
 
 
 class Classical(Request):
-    """What the two classical controllers share: the tab alone is moved, by deflection commands."""
+    """What the two classical controllers share: the tab alone is moved, by deflections or by rates."""
+
+    #: Names of the gains around the tab loop, in the order in which the loops are closed.
+    outer_gains: ClassVar[tuple[str, ...]]
 
     name: ControllerName
-    tab_command: Literal["deflection"] = "deflection"
-    specs: Specs
-    gains: None = Field(default=None, description="This version chooses the gains: null")
+    tab_command: Literal["deflection", "rate"] = Field(
+        default="deflection",
+        description="What the tab's actuator is given: a deflection, or a rate by an inner loop on the tab's angle "
+        "(seed 4.1.1)",
+    )
+    specs: Specs = Field(
+        default_factory=Specs, description="What the gains that are chosen must meet; may be left out when none is"
+    )
+    gains: Gains | None = None
+    smoothing: Annotated[Smoothing | None, AfterValidator(null_when_nothing_is_given_up)] = Field(
+        default=None, description="null: every point has its fastest design"
+    )
+    sample_time_s: Annotated[float, Field(ge=1e-5, le=1.0)] | None = Field(
+        default=None, description="Sample time of a digital controller; null: a continuous one"
+    )
+    computational_delay_s: Annotated[float, Field(ge=0.0, le=MOST_DELAY)] | None = Field(
+        default=None,
+        validate_default=True,
+        description="Time from a measurement to the command that is computed from it, at most ten samples; null: one "
+        "sample",
+    )
+
+    @field_validator("computational_delay_s")
+    @classmethod
+    def delay_of_samples(cls, delay: float | None, info: ValidationInfo) -> float | None:
+        """One sample unless it is given; refused without a sample time, or over too many samples."""
+        sample = info.data.get("sample_time_s")
+        if delay is None:
+            return sample if isinstance(sample, float) else None
+        if "sample_time_s" in info.data and sample is None:
+            raise refusal("a continuous controller has no computational delay", "null, or sample_time_s beside it")
+        if sample is not None and delay > MOST_DELAY * sample * (1.0 + 1e-9):
+            raise refusal(
+                f"longer than {MOST_DELAY:g} samples of {sample:g} s", f">= 0 and <= {MOST_DELAY * sample:g}, or null"
+            )
+        return delay
+
+    @property
+    def gain_names(self) -> tuple[str, ...]:
+        """Names of the gains of this kind and command, in the order in which the loops are closed."""
+        return ("K_theta", *self.outer_gains) if self.tab_command == "rate" else self.outer_gains
+
+    @property
+    def all_gains_given(self) -> bool:
+        """Whether nothing is left to choose."""
+        return self.gains is not None and all(getattr(self.gains, name) is not None for name in self.gain_names)
+
+    @model_validator(mode="after")
+    def inner_loop_of_rate_commands(self) -> Self:
+        """Refuse the gain of an inner tab loop where there is none."""
+        if self.tab_command != "rate" and self.gains is not None and self.gains.K_theta is not None:
+            raise refusal(
+                "a deflection command has no inner tab loop",
+                f"fields {', '.join(self.gain_names)}, or tab_command rate",
+                at="/gains/K_theta",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def specs_to_choose_by(self) -> Self:
+        """Refuse a controller that says neither what is to be met nor all its gains."""
+        if "specs" not in self.model_fields_set and not self.all_gains_given:
+            allowed = f"an object of specs, or all the gains {', '.join(self.gain_names)} given"
+            raise refusal("this field is required: gains are to be chosen", allowed, at="/specs")
+        return self
+
+    def on_grid(self, axes: GridAxes, at: str) -> Self:
+        """The controller with its specs and gains in their simplest form; refused unless they fit the grid."""
+        specs = fields_on_grid(self.specs, axes, f"{at}/specs")
+        gains = None if self.gains is None else fields_on_grid(self.gains, axes, f"{at}/gains")
+        return self.model_copy(update={"specs": specs, "gains": gains})
 
 
 class NegativeFeedback(Classical):
-    """``dt_cmd = sigma (K_i int(r - da) - K_p da - K_d da')``: stiffens and damps (seed 4.2.1)."""
+    """``dt_cmd = sigma (K_i int(r - da) - K_p da - K_d da')``: stiffens and damps (seed 4.1.2, 4.2.1)."""
+
+    outer_gains = ("K_d", "K_p", "K_i")
 
     kind: Literal["negative_feedback"]
+    gains: Annotated[NegativeFeedbackGains | None, NoneGivenIsNull] = Field(
+        default=None, description="Gains that are given; null: all are chosen"
+    )
     rate_filter_hz: Bandwidth | None = Field(
         default=None, description="Cut-off of the filtered derivative that supplies the aileron's rate; null: measured"
     )
 
 
 class PositiveFeedback(Classical):
-    """``dt_cmd = sigma (K_i int(r - da) + K_f da)``: cancels aerodynamic stiffness (seed 4.2.2)."""
+    """``dt_cmd = sigma (K_i int(r - da) + K_f da)``: cancels aerodynamic stiffness (seed 4.1.3, 4.2.2)."""
+
+    outer_gains = ("K_f", "K_i")
 
     kind: Literal["positive_feedback"]
+    gains: Annotated[PositiveFeedbackGains | None, NoneGivenIsNull] = Field(
+        default=None, description="Gains that are given; null: all are chosen"
+    )
 
 
 class Lqr(Request):

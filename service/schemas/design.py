@@ -61,19 +61,45 @@ class EnvelopeWarning(Answer):
     points: list[int]
 
 
+class Roughness(Answer):
+    """How far the gain is from what its neighbours give by interpolation, as a part of itself; null without neighbours.
+
+    That is what a table without this line would be wrong by.
+    """
+
+    worst_percent: float | None
+    worst_point: int | None
+    rms_percent: float | None
+
+
 class Gain(Answer):
     """One gain over the grid, SI and radians; null where the outcome is not ok."""
 
     name: str
     unit: str
     values: GridNumbers
+    roughness: Roughness
+
+
+class Smoothing(Answer):
+    """What was given up at each point so that gains vary smoothly."""
+
+    roughness_before: dict[str, Roughness]
+    bandwidth_lost_percent: GridNumbers
+    distance_before_percent: GridNumbers = Field(
+        description="To the nearest of the requested specs, in per cent of its limit"
+    )
+    distance_after_percent: GridNumbers
 
 
 class Verdict(Answer):
     """A spec over the points that carry a design: its worst value, where, and whether all meet it."""
 
     spec: str
-    limit: float = Field(json_schema_extra={"unit": "see `unit`"})
+    limit: float | None = Field(
+        json_schema_extra={"unit": "see `unit`"},
+        description="Of a spec that varies over the grid, the one at the worst point; null when no point is judged",
+    )
     unit: str
     source: Literal["request", "spec_pack", "limits"]
     worst_value: float | None = Field(json_schema_extra={"unit": "see `unit`"})
@@ -92,6 +118,7 @@ class Controller(Answer):
     outcomes: GridOutcomes
     reasons: GridReasons
     gains: list[Gain]
+    smoothing: Smoothing | None = Field(description="null where no smoothing is asked for")
     reduced_frequency: GridNumbers = Field(
         description="k = |s| c / (2 V) of the fastest closed-loop mode of the surfaces; null where there are no gains"
     )
@@ -105,7 +132,11 @@ class Links(Answer):
     points: str
     root_locus: dict[str, str]
     response: dict[str, str]
+    frequency_response: dict[str, str]
     actuator_requirements: dict[str, str]
+    verdicts: dict[str, str]
+    design_margin: dict[str, str]
+    scaling: dict[str, str]
     gains: dict[str, str]
     schedules: dict[str, dict[str, str]]
 

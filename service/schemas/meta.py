@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import Field
+
+from service.schemas.specs import PackName
 from service.schemas.wire import Answer
 
 
@@ -37,3 +40,26 @@ class Limits(Answer):
     """What this server takes; a refusal names its limit."""
 
     limits: list[Limit]
+
+
+class PackSpec(Answer):
+    """One spec of a pack, under the name that a request gives it."""
+
+    name: str
+    limit: float = Field(json_schema_extra={"unit": "see `unit`"})
+    unit: str
+
+
+class ShippedPack(Answer):
+    """A pack that a request may ask for by its name, and where its values come from."""
+
+    name: PackName
+    note: str
+    specs: list[PackSpec]
+
+
+class SpecPacks(Answer):
+    """The shipped packs. Their values are numbers to meet; meeting them is no claim of compliance with a standard."""
+
+    packs: list[ShippedPack]
+    note: str

@@ -176,7 +176,65 @@ class PointVerdict(Answer):
     unit: str
     source: str
     value: float | None = Field(json_schema_extra={"unit": "see `unit`"})
+    distance: float | None = Field(
+        json_schema_extra={"unit": "see `unit`"}, description="How far inside the limit; negative outside"
+    )
     passed: bool
+
+
+class StepRejection(Answer):
+    """After a unit step of a disturbing torque: the largest deviation, when it is over, and what stays.
+
+    It is over when the deviation stays within 5 % of its peak.
+    """
+
+    peak: float | None = Field(json_schema_extra={"unit": "see `unit` of the pair"})
+    peak_time_s: float | None
+    rejection_time_s: float | None
+    residual: float | None = Field(json_schema_extra={"unit": "see `unit` of the pair"})
+
+
+class DisturbancePair(Answer):
+    """What a disturbance or sensor noise does to a signal; null where it is unlimited.
+
+    `h2` times the root of the spectral density of white noise at the source is the root mean square of the signal.
+    """
+
+    from_: str = Field(alias="from")
+    to: str
+    unit: str
+    peak_gain: float | None = Field(json_schema_extra={"unit": "see `unit`"}, description="Over all frequencies")
+    peak_omega_rad_s: float | None
+    h2: float | None = Field(json_schema_extra={"unit": "see `h2_unit`"})
+    h2_unit: str
+    step: StepRejection | None = Field(description="Of a step; null for noise")
+
+
+class Relaxation(Answer):
+    """A spec whose relaxation alone makes the point feasible: as asked, and the best value with all others met."""
+
+    spec: str
+    unit: str
+    limit: float = Field(json_schema_extra={"unit": "see `unit`"})
+    reachable: float = Field(json_schema_extra={"unit": "see `unit`"})
+    relaxation_percent: float = Field(description="In per cent of the limit")
+
+
+class MissedSpec(Answer):
+    """A spec that the nearest design misses, and its value there; null where it has none."""
+
+    spec: str
+    unit: str
+    limit: float = Field(json_schema_extra={"unit": "see `unit`"})
+    nearest: float | None = Field(json_schema_extra={"unit": "see `unit`"})
+
+
+class Infeasibility(Answer):
+    """Why the point has no gains: the spec in the way, what alone would have to be relaxed, the smallest part first."""
+
+    blocking: str | None = Field(description="null when no single relaxation is enough")
+    relaxations: list[Relaxation]
+    nearest_design_misses: list[MissedSpec]
 
 
 class PointController(Answer):
@@ -186,10 +244,12 @@ class PointController(Answer):
     kind: Kind
     outcome: OutcomeCode
     reason: str | None
+    infeasibility: Infeasibility | None
     gains: list[PointGain]
     poles: list[Complex] | None
     margins: dict[str, Margins] | None
     step: Step | None
+    disturbance: list[DisturbancePair] | None
     riccati: Riccati | None
     verdicts: list[PointVerdict]
 

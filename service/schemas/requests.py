@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from service.schemas.actuators import Actuators
+from service.schemas.actuators import Actuators, TabActuator
 from service.schemas.aerodynamics import Aerodynamics, ThinAerofoil
-from service.schemas.controller_requests import Classical, Controller
+from service.schemas.controller_requests import Classical, Controller, Lqr, NegativeFeedback, PositiveFeedback
 from service.schemas.flight import Atmosphere, Grid, Reference, SurfaceAngle
+from service.schemas.grid_values import GridAxes, fields_on_grid
 from service.schemas.section import Geometry, HingeGeometry, Inertia
+from service.schemas.specs import AnySpecPack, SpecPack
 from service.schemas.trim import Trim
 from service.schemas.wire import Request, refusal
 
@@ -36,6 +38,48 @@ class LinearModelsRequest(Request):
     grid: Grid
 
 
+def servo_for(controller: NegativeFeedback | PositiveFeedback, tab: TabActuator) -> None:
+    """Refuse a deflection command to an ideal servo, but for gains that are given and a rate that is filtered."""
+    if tab.servo_bandwidth_hz is not None:
+        return
+    why = None
+    if not controller.all_gains_given:
+        why = (
+            "gains are chosen against the servo's lag, so the servo must have a bandwidth unless all the gains "
+            f"{', '.join(controller.gain_names)} are given"
+        )
+    elif isinstance(controller, NegativeFeedback) and controller.rate_filter_hz is None:
+        why = "with an ideal servo the tab's rate moves a measured aileron rate at once, so the rate must be filtered"
+    if why is not None:
+        raise refusal(
+            f"controller {controller.name} commands a tab deflection: {why}",
+            "a number; or null where all gains are given and, for negative_feedback, a rate_filter_hz",
+            at="/actuators/tab/servo_bandwidth_hz",
+        )
+
+
+def rate_loop_for(controller: Classical, tab: TabActuator) -> None:
+    """Refuse an ideal rate loop without delay where the gain around it is to be chosen: it would have no bound."""
+    given = controller.gains is not None and controller.gains.K_theta is not None
+    if tab.rate_loop_bandwidth_hz is None and tab.delay_s == 0.0 and not given:
+        raise refusal(
+            f"controller {controller.name} commands a tab rate: around an ideal rate loop without delay nothing bounds "
+            "K_theta, so it cannot be chosen",
+            "a number; or null where K_theta is given or delay_s is above 0",
+            at="/actuators/tab/rate_loop_bandwidth_hz",
+        )
+
+
+def no_delay_of_torques(tab: TabActuator) -> None:
+    """Refuse state feedback through a tab actuator with a delay."""
+    if tab.delay_s > 0.0:
+        raise refusal(
+            "this version designs state feedback (lqr) without delay",
+            "0 with an lqr controller, >= 0 and <= 1 without one",
+            at="/actuators/tab/delay_s",
+        )
+
+
 class DesignRequest(LinearModelsRequest):
     """A design: section, air, grid, actuators, the manoeuvre to be judged on, and the controllers wanted."""
 
@@ -43,22 +87,38 @@ class DesignRequest(LinearModelsRequest):
     actuators: Actuators
     reference: Reference
     controllers: Annotated[list[Controller], Field(min_length=1), AfterValidator(names_unique)]
-    spec_pack: Literal["default", "limit_speed"] = Field(
-        default="default", description="Named set of values every controller is judged on; it steers no design"
+    spec_pack: AnySpecPack = Field(
+        default="default",
+        description="Values every controller is judged on, by the name of a shipped pack (`GET /v1/spec-packs`) or as "
+        "a pack of one's own; it steers no design",
     )
 
     @model_validator(mode="after")
-    def servo_for_deflection_commands(self) -> Self:
-        """Refuse a deflection command to a tab that has no deflection servo."""
-        if any(isinstance(c, Classical) for c in self.controllers):
-            for field in ("servo_bandwidth_hz", "servo_damping_ratio"):
-                if getattr(self.actuators.tab, field) is None:
-                    raise refusal(
-                        "a controller commands a tab deflection, so the tab's deflection servo must be given",
-                        "a number, not null",
-                        at=f"/actuators/tab/{field}",
-                    )
+    def tab_that_takes_the_commands(self) -> Self:
+        """Refuse an ideal tab actuator where gains that are chosen would have no bound, and a delay of torques."""
+        for controller in self.controllers:
+            if isinstance(controller, Lqr):
+                no_delay_of_torques(self.actuators.tab)
+            elif controller.tab_command == "rate":
+                rate_loop_for(controller, self.actuators.tab)
+            else:
+                servo_for(controller, self.actuators.tab)
         return self
+
+    @model_validator(mode="after")
+    def values_on_the_grid(self) -> Self:
+        """Every value that varies over the grid in its simplest form; refused unless it fits the grid."""
+        axes = GridAxes.of(self.grid)
+        changed: dict[str, Any] = {
+            "controllers": [
+                wanted.on_grid(axes, f"/controllers/{place}/{wanted.kind}") if isinstance(wanted, Classical) else wanted
+                for place, wanted in enumerate(self.controllers)
+            ]
+        }
+        if isinstance(self.spec_pack, SpecPack):
+            specs = fields_on_grid(self.spec_pack.specs, axes, "/spec_pack/object/specs")
+            changed["spec_pack"] = self.spec_pack.model_copy(update={"specs": specs})
+        return self.model_copy(update=changed)
 
 
 #: How near to the leading edge and a hinge, where it is infinite, the pressure may be asked for: fraction of the chord.

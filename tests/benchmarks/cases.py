@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
+from design.classical.controller import ClassicalController
 from design.loop import Loop
 from design.lqr.synthesis import LqrController, design_lqr
 from design.lqr.torque_loop import lqr_loop
 from design.lqr.tracking import TrackingPlant, augment_with_integral
 from design.lqr.weights import BrysonWeights, ExplicitWeights, weight_matrices
+from design.specs import Spec
 from model.actuators import Actuator
 from model.examples import WIND_TUNNEL_TRIM, wind_tunnel
 from schedules.analysis import PlantEnvelope, analyse
@@ -20,6 +22,8 @@ from schedules.study import GridRequest, Reference, Study
 #: Gains of a root locus, samples of a step, length of the step [s] and its size [rad].
 GAINS, SAMPLES, DURATION = 300, 501, 1.0
 STEP = float(np.deg2rad(10.0))
+#: The tab's actuator of the wind-tunnel examples.
+TAB_ACTUATOR = Actuator(2.0 * np.pi * 40.0, 0.7, 2.0 * np.pi * 80.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +52,18 @@ def study() -> Study:
         grid=grid, name="bench", tab_actuator=Actuator(), aileron_actuator=Actuator(),
         reference=Reference(STEP, DURATION), controllers=(LqrController("lqr", weights),),
     )  # fmt: skip
+
+
+def tab_only() -> tuple[ClassicalController, ...]:
+    """The tab-only controllers of the example, by both commands of the tab's actuator."""
+    specs = (
+        Spec("damping_ratio", "min", 0.5), Spec("gain_margin", "min", 6.0), Spec("phase_margin", "min", np.pi / 4),
+        Spec("settling_time", "max", 0.6), Spec("overshoot", "max", 0.2),
+    )  # fmt: skip
+    nf = ClassicalController("nf", "negative_feedback", specs, 2.0 * np.pi * 100.0)
+    pf = ClassicalController("pf", "positive_feedback", (Spec("damping_ratio", "min", 0.4),))
+    by_rate = tuple(replace(c, name=f"{c.name} by rate", tab_command="rate") for c in (nf, pf))
+    return nf, pf, *by_rate
 
 
 @cache

@@ -24,6 +24,7 @@ class Row:
     goal : ratio peer / ours that we mean to reach
     ours, theirs : the work, without arguments; both return what they computed
     agree : raises AssertionError unless the two results are the same within the stated tolerance
+    copies : how many times the peer's work ours does; the peer's time is multiplied by it
     """
 
     job: str
@@ -32,6 +33,7 @@ class Row:
     ours: Callable[[], Any]
     theirs: Callable[[], Any]
     agree: Callable[[Any, Any], None]
+    copies: int = 1
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ def measure(row: Row, repeats: int) -> Measured:
     ours, theirs = [], []
     for _ in range(repeats):
         ours.append(_seconds(row.ours, calls_of_ours))
-        theirs.append(_seconds(row.theirs, calls_of_theirs))
+        theirs.append(row.copies * _seconds(row.theirs, calls_of_theirs))
     return Measured(row, ours, theirs)
 
 

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
+import control as ct
 import numpy as np
 import orjson
 
+from design.classical.controller import ClassicalController
+from design.classical.steering import StepReference
+from design.classical.synthesis import design_classical
+from design.classical.tab_loop import tab_loop
 from design.frequency.crossovers import critical_ratio, gain_crossings, phase_crossings
 from design.frequency.feedback import closed_loop, open_loop_value
 from design.frequency.loci import root_locus
@@ -21,7 +27,7 @@ from model.linearise import linearise
 from model.trim import TrimRequest, trim
 from schedules.run import run
 from tests.benchmarks import peers
-from tests.benchmarks.cases import DURATION, GAINS, SAMPLES, STEP, Case, case
+from tests.benchmarks.cases import DURATION, GAINS, SAMPLES, STEP, TAB_ACTUATOR, Case, case, tab_only
 from tests.benchmarks.measure import Row
 
 
@@ -34,7 +40,9 @@ def rows() -> list[Row]:
         _lqr_scipy(c),
         _lqr_control(c),
         _loci(c),
-        _margins(c),
+        _margins(c, 1),
+        _margins(c, 80),
+        *(_synthesis(c, controller) for controller in tab_only()),
         _all_margins(c),
         _steps(c),
         _refined_steps(c),
@@ -102,26 +110,56 @@ def _loci(c: Case) -> Row:
                 np.testing.assert_allclose(np.sort_complex(a), np.sort_complex(b), rtol=1e-6, atol=1e-6)
 
     return Row(
-        f"root loci with tracking, {gains.shape[-1]} gains", "ct.root_locus_map loop", 24.0,
+        f"root loci with tracking, {gains.shape[-1]} gains", "ct.root_locus_map loop", 40.0,
         lambda: root_locus(cut, gains).branches, lambda: peers.control_loci(c.loop, gains), agree,
     )  # fmt: skip
 
 
-def _margins(c: Case) -> Row:
-    """The part of `margins` that does what `ct.margin` does: crossovers of both kinds, gain and phase there."""
+def _margins(c: Case, copies: int) -> Row:
+    """The part of `margins` that does what `ct.margin` does: crossovers of both kinds, gain and phase there.
+
+    With several copies of the 25 points, the peer's time is taken of one of them and multiplied.
+    """
+    cuts = c.loop.cuts()
+    arrays = {name: np.repeat(getattr(cuts, name), copies, axis=1) for name in ("A", "b", "c", "gain")}
+    several = replace(cuts, **arrays)
 
     def ours() -> Any:
-        closed = closed_loop(c.loop.cuts())
+        closed = closed_loop(several)
         gain, unity = critical_ratio(phase_crossings(closed).value), gain_crossings(closed)
         phase = np.abs(np.angle(-open_loop_value(unity.value)))
         return gain, np.rad2deg(np.nanmin(phase, axis=-1)).reshape(len(c.loop.inputs), -1)
 
     def agree(ours: Any, theirs: Any) -> None:
-        np.testing.assert_allclose(ours[1], theirs, rtol=1e-6)
+        np.testing.assert_allclose(ours[1][:, ::copies], theirs, rtol=1e-6)
 
     return Row(
-        "gain and phase margins, both cuts", "ct.margin loop", 20.0, ours, lambda: peers.control_margins(c.loop),
-        agree,
+        f"gain and phase margins, {25 * copies} points, 2 cuts", "ct.margin loop", 20.0 if copies == 1 else 60.0, ours,
+        lambda: peers.control_margins(c.loop), agree, copies,
+    )  # fmt: skip
+
+
+def _synthesis(c: Case, controller: ClassicalController) -> Row:
+    """Gains of 25 points by specs, against one root locus of one point: what the search must not take longer than."""
+    servo = c.plant.servo_tab
+    reference = StepReference(STEP, DURATION, c.plant.trim.state[..., 0])
+    one = tab_loop(
+        c.plant.model.take((0, 0)), servo.take((0, 0)), TAB_ACTUATOR, controller,
+        {name: np.array(1.0) for name in controller.gain_units},
+    ).stage("K_i")  # fmt: skip
+    system = ct.ss(one.A, one.b[:, None], one.c[None, :], 0)
+    gains = np.concatenate([[0.0], np.geomspace(0.1, 1000.0, GAINS - 1)])
+
+    def ours() -> Any:
+        return design_classical(servo, TAB_ACTUATOR, controller, reference, c.plant.outcomes).outcomes.ok
+
+    def agree(ours: Any, theirs: Any) -> None:
+        assert ours.all()
+        assert theirs.shape == (GAINS, len(one.A))
+
+    return Row(
+        f"gains of 25 points by specs, {controller.name}", "one ct.root_locus_map", 1.0, ours,
+        lambda: ct.root_locus_map(system, gains=gains).loci, agree,
     )  # fmt: skip
 
 

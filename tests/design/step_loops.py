@@ -12,13 +12,19 @@ OUTPUTS = ("dt", "dt_rate", "da", "da_rate", "T_t", "T_a")
 
 def loop(A, B, E, K, N, C, F, D, offset, states=None, inputs=None, references=("r_a",), outputs=OUTPUTS) -> Loop:
     """A Loop from matrices over any grid, names filled in."""
-    n, m = np.shape(B)[-2:]
+    *grid, n, m = np.shape(B)
+    o = np.shape(C)[-2]
+
+    def none(rows, columns=0):
+        return np.zeros((*grid, rows, columns))
+
     return Loop(
-        *(np.asarray(M, dtype=float) for M in (A, B, E, K, N, C, F, D, offset)),
+        *(np.asarray(M, dtype=float) for M in (A, B, E, none(n), K, N, none(m), C, F, D, none(o, m), offset)),
         states=states or tuple(f"x{i}" for i in range(n)),
         inputs=inputs or ("tab", "aileron")[-m:],
         references=tuple(references),
         outputs=tuple(outputs),
+        disturbances=(),
         stages=(),
         delay=(0.0,) * m,
     )

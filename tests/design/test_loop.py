@@ -8,22 +8,26 @@ from design.loop import Loop, SisoLoop
 
 def _loop(delay=(0.0, 0.0), grid=(2, 3), seed=1):
     rng = np.random.default_rng(seed)
-    n, m, p, o = 4, 2, 1, 3
-    shapes = {"A": (n, n), "B": (n, m), "E": (n, p), "K": (m, n), "N": (m, p), "C": (o, n), "F": (o, n), "D": (o, m)}
+    n, m, p, o, q = 4, 2, 1, 3, 2
+    shapes = {
+        "A": (n, n), "B": (n, m), "E": (n, p), "G": (n, q), "K": (m, n), "N": (m, p), "M": (m, q),
+        "C": (o, n), "F": (o, n), "D": (o, m), "H": (o, m),
+    }  # fmt: skip
     arrays = {k: rng.standard_normal((*grid, *shape)) for k, shape in shapes.items()}
     return Loop(
         **arrays, offset=rng.standard_normal((*grid, o)), states=("a", "b", "c", "d"), inputs=("tab", "aileron"),
-        references=("r_a",), outputs=("x", "y", "z"), stages=(), delay=delay,
+        references=("r_a",), outputs=("x", "y", "z"), disturbances=("T", "da_noise"), stages=(), delay=delay,
     )  # fmt: skip
 
 
 def test_outputs_from_states_and_reference_obey_the_definition():
-    """y = C x + F x' + D u with u = -K x + N r and x' = A x + B u + E r, at a random state and reference."""
+    """y = C x + F x' + D u + H u' with u = -K x + N r and x' = A x + B u + E r, at a random state and reference."""
     loop = _loop()
     x, r = np.random.default_rng(2).standard_normal((2, 3, 4)), np.full((2, 3, 1), 0.7)
     u = -np.einsum("...mn,...n->...m", loop.K, x) + np.einsum("...mp,...p->...m", loop.N, r)
     xdot = (loop.A @ x[..., None] + loop.B @ u[..., None] + loop.E @ r[..., None])[..., 0]
-    y = (loop.C @ x[..., None] + loop.F @ xdot[..., None] + loop.D @ u[..., None])[..., 0]
+    udot = -loop.K @ xdot[..., None]
+    y = (loop.C @ x[..., None] + loop.F @ xdot[..., None] + loop.D @ u[..., None] + loop.H @ udot)[..., 0]
     ours = (loop.closed_outputs @ x[..., None] + loop.reference_feedthrough @ r[..., None])[..., 0]
     np.testing.assert_allclose(ours, y, rtol=1e-12)
     ours = (loop.closed @ x[..., None] + loop.reference_input @ r[..., None])[..., 0]

@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from design.classical.controller import ClassicalController
 from design.classical.normal_form import NormalForm
-from design.classical.synthesis import ClassicalController, design_classical, gain_values
+from design.classical.steering import StepReference
+from design.classical.synthesis import design_classical, gain_values
+from design.classical.tab_drive import tab_drive
 from design.classical.tab_loop import tab_loop
 from design.gains import Gain
 from design.lqr.synthesis import LqrController, design_lqr
@@ -114,7 +117,7 @@ def test_lqr_loop_offsets_belong_to_their_states(unsteady_a, lqr):
 
 @pytest.mark.parametrize("controller", CONTROLLERS.values(), ids=CONTROLLERS)
 def test_normal_form_has_the_poles_of_the_tab_loop(unsteady_a, tab_actuator, controller):
-    form = NormalForm.of(unsteady_a.servo, tab_actuator, controller.kind, controller.rate_filter)
+    form = NormalForm.of(unsteady_a.servo, tab_drive(tab_actuator, "deflection"), controller)
     kappa = np.random.default_rng(4).uniform(0.1, 0.7, (*unsteady_a.grid.shape, form.numerators.shape[-2]))
     names = NAMES[controller.kind]
     gains = tuple(Gain(n, "", v) for n, v in zip(names, np.moveaxis(form.gains(kappa), -1, 0), strict=True))
@@ -155,16 +158,21 @@ def test_tab_torque_obeys_the_equations_of_motion(unsteady_a, tab_actuator, cont
     assert np.all(np.abs(settled - needed) > 1e-3 * np.abs(needed - still))
 
 
+def _step(plant):
+    """A step of 10 degrees, followed for a second."""
+    return StepReference(np.deg2rad(10.0), 1.0, plant.trim.state[..., 0])
+
+
 def test_classical_design_meets_its_specs_on_the_flown_loop(unsteady_a, tab_actuator):
     from design.assess import achieved, assess
 
     specs = (Spec("damping_ratio", "min", 0.5), Spec("gain_margin", "min", 6.0), Spec("phase_margin", "min", np.pi / 4))
     request = ClassicalController("nf", "negative_feedback", specs, 600.0)
-    gains, outcomes = design_classical(
-        unsteady_a.servo, tab_actuator, request, 1.0, Outcomes.all_ok(unsteady_a.grid.shape)
+    found = design_classical(
+        unsteady_a.servo, tab_actuator, request, _step(unsteady_a), Outcomes.all_ok(unsteady_a.grid.shape)
     )
-    assert outcomes.ok.all()
-    loop = tab_loop(unsteady_a.model, unsteady_a.servo, tab_actuator, request, gain_values(gains))
+    assert found.outcomes.ok.all()
+    loop = tab_loop(unsteady_a.model, unsteady_a.servo, tab_actuator, request, gain_values(found.gains))
     found = assess(loop, np.array([0.1]), 1.0)
     for spec in specs:
         assert np.all(spec.met(achieved(found, spec.quantity)))
@@ -175,9 +183,10 @@ def test_brute_force_finds_nothing_faster(unsteady_a, tab_actuator, index):
     """Positive feedback, damping 0.4: all pairs of gains on a mesh, from the transfer function alone."""
     servo, w, z = unsteady_a.servo, tab_actuator.servo_bandwidth, tab_actuator.servo_damping_ratio
     request = replace(CONTROLLERS["pf"], specs=(Spec("damping_ratio", "min", 0.4),))
-    gains, outcomes = design_classical(servo, tab_actuator, request, 1.0, Outcomes.all_ok(unsteady_a.grid.shape))
-    assert outcomes.ok.all()
-    K_f, K_i = (g.values[index] for g in gains)
+    ok = Outcomes.all_ok(unsteady_a.grid.shape)
+    design = design_classical(servo, tab_actuator, request, _step(unsteady_a), ok)
+    assert design.outcomes.ok.all()
+    K_f, K_i = (g.values[index] for g in design.gains)
     omega = np.geomspace(0.5, 200.0, 1500)
     top, bottom = -(w**2) * servo.numerator[index], np.polymul([1.0, 2.0 * z * w, w**2], servo.denominator[index])
 

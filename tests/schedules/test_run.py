@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from design.classical.synthesis import ClassicalController
+from design.classical.controller import ClassicalController
 from design.gains import Gain
 from design.lqr.weights import ExplicitWeights
 from design.outcome import Outcome
 from design.specs import Spec
-from schedules.run import ControllerRefused, run
+from schedules.designed import ControllerRefused
+from schedules.run import run
 from schedules.study import GridRequest
 
 
@@ -91,10 +92,11 @@ def test_gains_that_fail_their_specs_on_the_flown_loop_are_withdrawn(wind_tunnel
     real = room.design_classical
 
     def wrong(*arguments):
-        gains, outcomes = real(*arguments)
-        return tuple(
-            Gain(g.name, g.unit, np.where([[True] * 3 + [False]] * 2, g.values, 10.0 * g.values)) for g in gains
-        ), outcomes
+        found = real(*arguments)
+        right = [[True] * 3 + [False]] * 2
+        return replace(
+            found, gains=tuple(Gain(g.name, g.unit, np.where(right, g.values, 10.0 * g.values)) for g in found.gains)
+        )
 
     monkeypatch.setattr(room, "design_classical", wrong)
     controller = run(replace(wind_tunnel_study, controllers=wind_tunnel_study.controllers[:1])).controllers[0]
@@ -125,14 +127,14 @@ def test_weights_that_cannot_work_are_refused(wind_tunnel_study):
 
 
 def test_a_point_that_cannot_be_judged_is_withdrawn_alone(wind_tunnel_study, monkeypatch):
-    import schedules.run as room
+    import schedules.judging as room
 
     real = room.assess
 
-    def fails_at_the_fastest(loop, *arguments):
+    def fails_at_the_fastest(loop, *arguments, **options):
         if np.max(np.sum(np.abs(loop.A), axis=(-1, -2))) >= worst:
             raise np.linalg.LinAlgError("Eigenvalues did not converge")
-        return real(loop, *arguments)
+        return real(loop, *arguments, **options)
 
     study = replace(wind_tunnel_study, controllers=wind_tunnel_study.controllers[2:])
     worst = np.max(np.sum(np.abs(run(study).controllers[0].loop.A), axis=(-1, -2)))
@@ -151,14 +153,14 @@ def test_the_same_study_gives_the_same_numbers(wind_tunnel_study, wind_tunnel_en
 
 
 def test_points_that_only_fail_together_are_all_withdrawn(wind_tunnel_study, monkeypatch):
-    import schedules.run as room
+    import schedules.judging as room
 
     real = room.assess
 
-    def fails_in_company(loop, *arguments):
+    def fails_in_company(loop, *arguments, **options):
         if loop.A.ndim > 2:
             raise np.linalg.LinAlgError("Eigenvalues did not converge")
-        return real(loop, *arguments)
+        return real(loop, *arguments, **options)
 
     monkeypatch.setattr(room, "assess", fails_in_company)
     controller = run(replace(wind_tunnel_study, controllers=wind_tunnel_study.controllers[2:])).controllers[0]

@@ -95,11 +95,30 @@ FIELDS = [
     ("/grid/mach", [0.5], "/grid", None, "one of dynamic_pressure_pa, airspeed_m_s, mach"),
     ("/grid", {"altitude_m": [0], "mach": [0.5, 1.0]}, "/grid/mach/1", "1", ">= 0.001 and < 1"),
     ("/grid", {"altitude_m": [0], "airspeed_m_s": [400]}, "/grid", "1", "Mach < 1 at one point at least"),
-    ("/actuators/tab/servo_bandwidth_hz", None, "/actuators/tab/servo_bandwidth_hz", "Hz", "a number, not null"),
-    ("/actuators/tab/servo_damping_ratio", None, "/actuators/tab/servo_damping_ratio", "1", "a number, not null"),
+    (
+        "/actuators/tab/servo_bandwidth_hz",
+        None,
+        "/actuators/tab/servo_damping_ratio",
+        "1",
+        "null, or servo_bandwidth_hz beside it",
+    ),
+    (
+        "/actuators/tab",
+        {},
+        "/actuators/tab/servo_bandwidth_hz",
+        "Hz",
+        "a number; or null where all gains are given and, for negative_feedback, a rate_filter_hz",
+    ),
     ("/actuators/tab/torque_loop_bandwidth_hz", 50, "/actuators/tab/torque_loop_bandwidth_hz", None, "null"),
     ("/actuators/aileron/torque_loop_bandwidth_hz", 50, "/actuators/aileron/torque_loop_bandwidth_hz", None, "null"),
-    ("/actuators/tab/delay_s", 0.01, "/actuators/tab/delay_s", "s", ">= 0 and <= 0"),
+    ("/actuators/tab/delay_s", 1.5, "/actuators/tab/delay_s", "s", ">= 0 and <= 1"),
+    (
+        "/actuators/tab/delay_s",
+        0.01,
+        "/actuators/tab/delay_s",
+        "s",
+        "0 with an lqr controller, >= 0 and <= 1 without one",
+    ),
     ("/actuators/aileron/delay_s", 0.01, "/actuators/aileron/delay_s", "s", ">= 0 and <= 0"),
     (
         "/actuators/tab/limits/rate_deg_s",
@@ -121,8 +140,7 @@ FIELDS = [
         None,
         "one of lqr, negative_feedback, positive_feedback",
     ),
-    ("/controllers/0/tab_command", "rate", "/controllers/0/tab_command", None, "only deflection"),
-    ("/controllers/0/gains", {"K_p": 1.0}, "/controllers/0/gains", None, "null"),
+    ("/controllers/0/tab_command", "torque", "/controllers/0/tab_command", None, "one of deflection, rate"),
     ("/controllers/0/name", "1x", "/controllers/0/name", None, "text, matching ^[A-Za-z][A-Za-z0-9_-]{0,62}$"),
     ("/controllers/0/name", "n\n", "/controllers/0/name", None, "text, matching ^[A-Za-z][A-Za-z0-9_-]{0,62}$"),
     ("/controllers/1/name", "nf", "/controllers/1/name", None, "a new name"),
@@ -131,14 +149,14 @@ FIELDS = [
         2,
         "/controllers/0/specs/damping_ratio_min",
         "1",
-        ">= 0 and <= 1, or null",
+        ">= 0 and <= 1",
     ),
     (
         "/controllers/0/specs/phase_margin_deg_min",
         -3,
         "/controllers/0/specs/phase_margin_deg_min",
         "deg",
-        ">= 0 and <= 90, or null",
+        ">= 0 and <= 90",
     ),
     ("/controllers/2/reference", "none", "/controllers/2/reference", None, "only aileron"),
     ("/controllers/2/sample_time_s", 0.01, "/controllers/2/sample_time_s", None, "null"),
@@ -158,6 +176,36 @@ FIELDS = [
         ">= 1e-06 and <= 1e+06",
     ),
     ("/spec_pack", "mil", "/spec_pack", None, "one of default, limit_speed"),
+    (
+        "/spec_pack",
+        3,
+        "/spec_pack",
+        None,
+        "one of default, limit_speed; or an object with the fields name, specs",
+    ),
+    ("/spec_pack", {"name": "x"}, "/spec_pack/specs", None, None),
+    (
+        "/spec_pack",
+        {"name": "default", "specs": {}},
+        "/spec_pack/name",
+        None,
+        "text other than default, limit_speed",
+    ),
+    (
+        "/spec_pack",
+        {"name": "x", "specs": {"tab_power_w_max": 0.0}},
+        "/spec_pack/specs/tab_power_w_max",
+        "W",
+        "> 0 and <= 1e+09",
+    ),
+    ("/spec_pack", {"name": "x", "specs": {"power_w_max": 1.0}}, "/spec_pack/specs/power_w_max", None, None),
+    (
+        "/spec_pack",
+        {"name": "x", "specs": {"aileron_rate_deg_s_max": {"axis": "altitude_m", "values": [1.0]}}},
+        "/spec_pack/specs/aileron_rate_deg_s_max/values",
+        "deg/s",
+        "a list of 2 numbers",
+    ),
     ("/name", "x" * 201, "/name", None, "text, at least 1 characters, at most 200 characters"),
     ("/name", "", "/name", None, "text, at least 1 characters, at most 200 characters"),
 ]
@@ -177,12 +225,26 @@ def test_names_field_unit_and_range(
 
 
 @pytest.mark.parametrize("text", ["NaN", "Infinity", "-Infinity", "1e999", "-1e999"])
-@pytest.mark.parametrize("pointer", ["/geometry/chord_m", "/trim/tab_deg", "/grid/altitude_m/1"])
+@pytest.mark.parametrize(
+    "pointer",
+    [
+        "/geometry/chord_m",
+        "/trim/tab_deg",
+        "/grid/altitude_m/1",
+        "/controllers/0/specs/phase_margin_deg_min",
+        "/controllers/1/specs/damping_ratio_min/values/1",
+        "/controllers/1/gains/K_f/values/1/3",
+    ],
+)
 def test_numbers_that_are_not_finite(client: TestClient, wanted: Any, refused: Any, pointer: str, text: str) -> None:
+    wanted["controllers"][1] |= {
+        "specs": {"damping_ratio_min": {"axis": "altitude_m", "values": [0.3, 0.4]}},
+        "gains": {"K_f": {"values": [[0.4, 0.3, 0.3, 0.2], [0.4, 0.3, 0.3, 0.2]]}},
+    }
     response = client.post("/v1/designs", content=raw(wanted, pointer, text), headers=JSON)
     (error,) = refused(response, 422)["errors"]
     assert error["pointer"] == pointer
-    assert error["unit"] in ("m", "deg")
+    assert error["unit"] in ("m", "deg", "1")
     assert error["allowed"]
 
 

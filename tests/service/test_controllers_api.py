@@ -216,7 +216,7 @@ def test_gains_outside_the_grid_are_clipped(client: TestClient, here: str, desig
         ("root-locus?point=0&loop=K_x", "/loop", "one of K_d, K_p, K_i, tab"),
         ("root-locus?point=0&count=99", "/count", "an integer >= 100"),
         ("root-locus?point=0&count=2001", "/count", "<= 2000"),
-        ("root-locus?point=0&gain=3", "/gain", "fields point, loop, count"),
+        ("root-locus?point=0&gain=3", "/gain", "fields point, loop, damping_ratio, count"),
         ("response?point=0&kind=nonlinear", "/kind", "only linear"),
         ("response?point=0&samples=5001", "/samples", "<= 5000"),
         ("response?point=0&samples=1", "/samples", "an integer >= 2"),

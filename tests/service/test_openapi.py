@@ -61,6 +61,10 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/root-locus"),
         ("get", "/v1/designs/{id}/controllers/{name}/response"),
         ("get", "/v1/designs/{id}/controllers/{name}/actuator-requirements"),
+        ("get", "/v1/designs/{id}/controllers/{name}/frequency-response"),
+        ("get", "/v1/designs/{id}/controllers/{name}/verdicts"),
+        ("get", "/v1/designs/{id}/controllers/{name}/design-margin"),
+        ("get", "/v1/designs/{id}/controllers/{name}/scaling"),
         ("get", "/v1/designs/{id}/controllers/{name}/gains"),
         ("get", "/v1/designs/{id}/schedules/{controller}.{suffix}"),
         ("get", "/v1/atmosphere"),
@@ -69,6 +73,7 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("post", "/v1/eigenvalue-sweeps"),
         ("post", "/v1/steady-state-maps"),
         ("post", "/v1/similarity"),
+        ("get", "/v1/spec-packs"),
         ("get", "/v1/examples"),
         ("get", "/v1/examples/{name}"),
         ("get", "/v1/limits"),
@@ -87,7 +92,7 @@ def test_every_body_example_runs(client: TestClient, document: dict[str, Any]) -
             assert response.status_code in (200, 201), (path, name, response.text)
             assert str(response.status_code) in operation["responses"]
             ran.append((path, name))
-    assert len(ran) == 17
+    assert len(ran) == 20
 
 
 @pytest.mark.usefixtures("design")
@@ -119,7 +124,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 19
+    assert checked == 24
 
 
 def test_every_error_is_declared_with_its_shape(document: dict[str, Any]) -> None:

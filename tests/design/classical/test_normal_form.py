@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from design.classical.controller import ClassicalController
 from design.classical.normal_form import NormalForm
-from design.classical.synthesis import ClassicalController, gain_values
+from design.classical.synthesis import gain_values
+from design.classical.tab_drive import tab_drive
 from design.classical.tab_loop import tab_loop
 from design.gains import Gain
 from model.polynomial_product import times
@@ -19,7 +21,7 @@ NAMES = {"negative_feedback": ("K_d", "K_p", "K_i"), "positive_feedback": ("K_f"
 
 @pytest.mark.parametrize("controller", CONTROLLERS.values(), ids=CONTROLLERS)
 def test_closed_loop_polynomial_has_the_loop_s_poles(plant_b, tab_actuator, controller):
-    form = NormalForm.of(plant_b.servo, tab_actuator, controller.kind, controller.rate_filter)
+    form = NormalForm.of(plant_b.servo, tab_drive(tab_actuator, controller.tab_command), controller)
     kappa = np.random.default_rng(4).uniform(0.1, 1.5, (*plant_b.grid.shape, form.numerators.shape[-2]))
     names = NAMES[controller.kind]
     gains = [Gain(n, "", v) for n, v in zip(names, np.moveaxis(form.gains(kappa), -1, 0), strict=True)]
@@ -33,7 +35,7 @@ def test_closed_loop_polynomial_has_the_loop_s_poles(plant_b, tab_actuator, cont
 
 @pytest.mark.parametrize("controller", CONTROLLERS.values(), ids=CONTROLLERS)
 def test_loop_transfer_equals_the_cut_at_the_actuator(plant_b, tab_actuator, controller):
-    form = NormalForm.of(plant_b.servo, tab_actuator, controller.kind, controller.rate_filter)
+    form = NormalForm.of(plant_b.servo, tab_drive(tab_actuator, controller.tab_command), controller)
     kappa = np.full((*plant_b.grid.shape, form.numerators.shape[-2]), 0.7)
     gains = [Gain(n, "", v) for n, v in zip(NAMES[controller.kind], np.moveaxis(form.gains(kappa), -1, 0), strict=True)]
     cut = tab_loop(plant_b.model, plant_b.servo, tab_actuator, controller, gain_values(tuple(gains))).cut("tab")
@@ -52,7 +54,8 @@ def test_times_is_polynomial_multiplication():
 
 
 def test_batched_equals_single(plant_a, tab_actuator):
-    whole = NormalForm.of(plant_a.servo, tab_actuator, "negative_feedback", 600.0)
-    one = NormalForm.of(plant_a.servo.take((0, 2)), tab_actuator, "negative_feedback", 600.0)
+    drive, controller = tab_drive(tab_actuator, "deflection"), CONTROLLERS["nf"]
+    whole = NormalForm.of(plant_a.servo, drive, controller)
+    one = NormalForm.of(plant_a.servo.take((0, 2)), drive, controller)
     np.testing.assert_array_equal(whole.take((0, 2)).numerators, one.numerators)
     np.testing.assert_array_equal(whole.take((0, 2)).denominator, one.denominator)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -38,4 +40,32 @@ def test_a_pole_on_the_axis_is_told_from_one_beside_it():
     for seed in range(5):
         assert not closed_loop(in_other_states(on, seed)).regular[0]
         assert closed_loop(in_other_states(beside, seed)).regular[0]
-    assert np.all(closed_loop(on).b == 0.0)
+
+
+def test_stable_is_left_of_the_axis():
+    loop = stabilised(4, 3, seed=3)
+    np.testing.assert_array_equal(closed_loop(loop).stable, [True] * 4)
+    shifted = replace(loop, A=loop.A + np.array([0.0, 20.0, 0.0, 20.0])[:, None, None] * np.eye(3))
+    np.testing.assert_array_equal(closed_loop(shifted).stable, [True, False, True, False])
+
+
+def test_quietened_points_have_no_loop_and_leave_the_others_alone():
+    closed = closed_loop(stabilised(3, 4, seed=4))
+    kept = np.array([True, False, True])
+    quiet = closed.quietened(kept)
+    T, slope = complementary(quiet, np.array([0, 1, 2]), np.array([0.3, 0.3, 0.3]), delayed=False)
+    expected, _ = complementary(closed, np.array([0, 1, 2]), np.array([0.3, 0.3, 0.3]), delayed=False)
+    assert (T[1], slope[1]) == (0.0, 0.0)
+    np.testing.assert_array_equal(T[kept], expected[kept])
+    np.testing.assert_allclose(quiet.poles[1], -np.ones(4))
+    assert closed.quietened(np.array([True, True, True])) is closed
+
+
+def test_zero_and_infinite_frequency():
+    closed = closed_loop(stabilised(2, 4, seed=5))
+    T, slope = complementary(closed, np.array([0, 1, 1]), np.array([0.0, 0.0, np.inf]), delayed=False)
+    np.testing.assert_allclose(T[:2], closed.numerator[:, -1] / closed.characteristic[:, -1])
+    np.testing.assert_allclose(T[2], 0.0)
+    h = 1e-6
+    (up, _), (down, _) = (complementary(closed, np.array([0]), np.array([x]), delayed=False) for x in (h, -h))
+    np.testing.assert_allclose(slope[0], (up - down)[0] / (2 * h), rtol=1e-6)

@@ -165,10 +165,43 @@ def test_the_sign_is_that_of_the_gain():
     loop = random_loops(8, 4, seed=5)
     turned = replace(loop, c=-loop.c, sign=-1)
     a, b = root_locus(loop), root_locus(turned)
-    for name in ("gains", "crossing_gain", "crossing_omega", "breakaway_gain", "asymptote_angles"):
-        same(getattr(a, name), getattr(b, name))
+    for field in fields(a):
+        if field.name not in ("branches", "sign", "departure_angles", "breakaway_point"):
+            same(getattr(a, field.name), getattr(b, field.name))
+    for name in ("departure_angles", "asymptote_angles", "arrival_angles"):
+        listed_a, listed_b = listed(getattr(a, name)), listed(getattr(b, name))
+        np.testing.assert_allclose(np.exp(1j * listed_a), np.exp(1j * listed_b), atol=1e-9)
     np.testing.assert_allclose(a.branches, b.branches, atol=1e-9)
     assert (a.sign, b.sign) == (1, -1)
+
+
+@pytest.mark.parametrize("order", [2, 3, 5, 7])
+def test_the_breakaways_of_both_signs_are_all_real_stationary_gains(order):
+    """``d' num - d num' = 0`` with a real gain: each belongs to one of the two loci, and to no other."""
+    loop = random_loops(20, order, seed=30 + order)
+    both = root_locus(loop), root_locus(replace(loop, sign=-1))
+    for i in range(20):
+        A, b, c = loop.A[i], loop.b[i], loop.c[i]
+        d = np.poly(A)
+        numerator = np.poly(A - np.outer(b, c)) - d
+        s = np.roots(np.polysub(np.polymul(np.polyder(d), numerator), np.polymul(d, np.polyder(numerator))))
+        k = -np.polyval(d, s) / np.polyval(numerator, s)
+        real = k[(np.abs(k.imag) < 1e-5 * np.abs(k)) & (np.abs(k) < 1e6) & (np.abs(k) > 1e-6)].real
+        found = np.concatenate([listed(both[0].breakaway_gain[i]), -listed(both[1].breakaway_gain[i])])
+        found = found[(np.abs(found) < 1e6) & (np.abs(found) > 1e-6)]
+        np.testing.assert_allclose(np.sort(found), np.sort(real), rtol=1e-4)
+
+
+def test_both_signs_share_the_real_axis_between_them():
+    """Each point of the axis that is no pole or zero is on exactly one of the two loci: the parity rule."""
+    pole, zero = np.array([-1.0, -2.5, -4.0, 1.0]), np.array([-3.0, -6.0])
+    loop = of_transfer(np.poly(zero), np.poly(pole), gain=1.0)
+    for s in (-7.0, -5.0, -3.5, -2.8, -1.7, 0.0, 2.0):
+        k = -np.prod(s - pole) / np.prod(s - zero)
+        right = np.sum(np.concatenate([pole, zero]) > s)
+        assert (k > 0.0) == (right % 2 == 1)
+        locus = root_locus(replace(loop, sign=1 if k > 0.0 else -1), np.array([0.0, abs(k), 2.0 * abs(k)]))
+        assert np.abs(locus.branches[:, 1] - s).min() < 1e-9
 
 
 def test_a_negative_chosen_gain_goes_the_other_way():
@@ -180,21 +213,51 @@ def test_a_negative_chosen_gain_goes_the_other_way():
     np.testing.assert_allclose(a.branches, b.branches, atol=1e-9)
 
 
-def test_default_gains():
+@pytest.mark.parametrize("count", [48, 100, 300])
+def test_default_gains(count):
     loop = random_loops(20, 5, seed=7)
-    locus = root_locus(loop)
-    assert locus.gains.shape == (20, 300)
+    locus = root_locus(loop, count=count)
+    assert locus.gains.shape == (20, count)
     assert np.all(locus.gains[:, 0] == 0.0)
     assert np.all(np.diff(locus.gains, axis=-1) > 0.0)
-    np.testing.assert_allclose(locus.gains[:, 1], loop.gain / 100.0)
-    np.testing.assert_allclose(locus.gains[:, -1], loop.gain * 100.0)
+    low, high = loop.gain[:, None] / 100.0, loop.gain[:, None] * 100.0
+    np.testing.assert_allclose(locus.gains[:, -1:], high)
+    for expected in (low, loop.gain[:, None], locus.crossing_gain, locus.breakaway_gain):
+        for i, j in np.argwhere((expected >= low) & (expected < high)):
+            assert np.isclose(locus.gains[i], expected[i, j], rtol=1e-9, atol=0.0).any()
     assert np.all(np.any(locus.gains == loop.gain[:, None], axis=-1))
-    ratio = locus.gains[:, 2:] / locus.gains[:, 1:-1]
-    assert np.all(ratio < 1e4 ** (1 / 260))
-    for special in (locus.crossing_gain, locus.breakaway_gain):
-        for i, j in np.argwhere((special > locus.gains[:, 1:2]) & (special < locus.gains[:, -1:])):
-            assert np.isclose(locus.gains[i], special[i, j], rtol=1e-9, atol=0.0).any()
     np.testing.assert_array_equal(pole_order(locus.branches[..., 0]), locus.branches[..., 0])
+
+
+def test_default_gains_have_the_poles_of_gains_given():
+    loop = random_loops(10, 6, seed=17)
+    locus = root_locus(loop)
+    same_gains = root_locus(loop, locus.gains)
+    far = np.abs(same_gains.branches - locus.branches) > 1e-10 * np.abs(locus.branches).max(axis=(1, 2))[:, None, None]
+    # Where poles meet, either continuation of each is as continuous as the other.
+    assert far.mean() < 0.1
+    np.testing.assert_allclose(
+        np.sort_complex(np.swapaxes(locus.branches, 1, 2)).sum(axis=-1),
+        np.sort_complex(np.swapaxes(same_gains.branches, 1, 2)).sum(axis=-1),
+        rtol=1e-9,
+    )
+
+
+def test_a_point_without_entries_is_nan_and_harms_no_neighbour():
+    loop = random_loops(5, 4, seed=18)
+    A, gain = loop.A.copy(), loop.gain.copy()
+    A[1, 0, 0], gain[3] = np.nan, np.inf
+    for gains in (None, np.linspace(0.0, 2.0, 30)):
+        whole, broken = root_locus(loop, gains), root_locus(replace(loop, A=A, gain=gain), gains)
+        assert broken.sign == loop.sign
+        for field in fields(whole):
+            a, b = getattr(whole, field.name), getattr(broken, field.name)
+            if field.name != "sign":
+                np.testing.assert_array_equal(a[[0, 2, 4]], b[[0, 2, 4]])
+                assert np.all(np.isnan(b[[1, 3]]))
+    alone = root_locus(replace(loop.take(1), A=A[1]))
+    assert alone.branches.shape == (4, 300)
+    assert np.all(np.isnan(alone.branches))
 
 
 def test_a_chosen_gain_of_zero_still_has_a_locus():
@@ -238,7 +301,7 @@ def test_a_pole_that_does_not_move_changes_nothing(pole):
 
 def test_response_beside_a_pole():
     diagonal, ones = np.diag([0.0, -1.0])[None], np.ones((1, 2))
-    at = landmarks._response(diagonal, ones, ones, np.array([[-1.0 + 0.0j]]))
+    at = landmarks.response_beside_poles(diagonal, ones, ones, np.array([[-1.0 + 0.0j]]))
     assert abs(at.value[0, 0]) > 1e9
 
 
@@ -337,11 +400,15 @@ def test_grid_equals_points():
     assert locus.crossing_gain.shape == (2, 3, 5)
     assert locus.breakaway_point.shape == (2, 3, 8)
     assert locus.asymptote_angles.shape == (2, 3, 5)
+    given = root_locus(loop, np.linspace(0.0, 5.0, 200))
     for i in np.ndindex(2, 3):
-        one = root_locus(loop.take(i))
-        for field in fields(locus):
-            mine, alone = getattr(locus.take(i), field.name), getattr(one, field.name)
-            np.testing.assert_allclose(mine, alone, rtol=1e-9, atol=1e-6)
+        for all_of_them, one in (
+            (locus, root_locus(loop.take(i))),
+            (given, root_locus(loop.take(i), np.linspace(0.0, 5.0, 200))),
+        ):
+            for field in fields(locus):
+                mine, alone = getattr(all_of_them.take(i), field.name), getattr(one, field.name)
+                np.testing.assert_allclose(mine, alone, rtol=1e-12, atol=1e-12)
 
 
 def test_abscissa_at_the_crossing_is_zero():

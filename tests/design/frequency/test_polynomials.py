@@ -42,7 +42,7 @@ def test_product_and_derivatives():
 
 def test_powers_evaluate():
     p, x = RNG.standard_normal((3, 5)), np.array([-2.0, 0.0, 1.5])
-    np.testing.assert_allclose((p * powers(x, 5)).sum(axis=-1), evaluate(p, x[:, None])[:, 0], rtol=1e-13)
+    np.testing.assert_allclose((p.T * powers(x, 5)).sum(axis=0), evaluate(p, x[:, None])[:, 0], rtol=1e-13)
 
 
 def test_magnitude_bound_is_no_less_than_the_value():

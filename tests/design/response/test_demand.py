@@ -192,8 +192,23 @@ def test_unknown_actuator_and_missing_output_are_named():
     one = second_order(10.0, 0.5)
     with pytest.raises(ValueError, match="no actuator 'flap'; there are tab, aileron"):
         demand_of(one, 1.0, "flap")
-    with pytest.raises(ValueError, match="no output 'T_t'; it has da, da_rate, T_a"):
+    with pytest.raises(ValueError, match="no output 'dt_rate'; it has da, da_rate, T_a"):
         demand_of(one, 1.0, "tab")
+
+
+def test_a_torque_that_is_not_finite_is_unlimited():
+    """A loop that leaves the torque out of its outputs says that there is none that is finite."""
+    one = data_set_a(np.array([20.0]))
+    kept = [i for i, name in enumerate(one.outputs) if name != "T_t"]
+    rows = {name: getattr(one, name)[..., kept, :] for name in ("C", "F", "D", "H")}
+    without = replace(one, **rows, offset=one.offset[..., kept], outputs=tuple(one.outputs[i] for i in kept))
+    found, whole = demand_of(without, 1.0, "tab"), demand_of(one, 1.0, "tab")
+    for name in ("peak_torque", "rms_torque", "peak_power", "rms_power", "peak_acceleration"):
+        assert np.all(getattr(found, name) == np.inf), name
+    for name in ("holding_torque", "energy_out", "energy_back"):
+        assert np.all(np.isnan(getattr(found, name))), name
+    for name in ("peak_rate", "peak_deflection"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
 
 
 def test_no_points_ask_for_nothing():

@@ -1,0 +1,87 @@
+"""Frequency responses of one controller of a design."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, Field
+
+from design.disturbance.frequency_response import response_frequencies
+from design.frequency.poles import poles
+from model.arrays import ComplexArray
+from service.answering import answer, encode
+from service.designs import controller_of, point_with_gains
+from service.limits import check_size
+from service.openapi import problems
+from service.presenters.frequency_response import frequency_response_document
+from service.refusals import FieldRefusal, InvalidRequest
+from service.routes.controllers import ControllerName, Point
+from service.routes.designs import DesignId
+from service.schemas.frequency_answers import FrequencyResponses
+from service.schemas.wire import PARAMETERS
+from service.state import HEAVY, DesignsHere, SettingsHere
+
+router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/frequency-response", tags=["controllers"])
+
+#: Frequencies that may be asked for [rad/s].
+Frequency = Annotated[float, Field(ge=1e-6, le=1e8, json_schema_extra={"unit": "rad/s"})]
+
+
+class WantedResponses(BaseModel):
+    """At which point, and over which frequencies."""
+
+    model_config = PARAMETERS
+
+    point: Point
+    from_: Frequency | None = Field(
+        default=None, alias="from", description="First frequency; without it, a decade below the slowest pole"
+    )
+    to: Frequency | None = Field(
+        default=None, description="Last frequency; without it, the decade above the fastest pole"
+    )
+    count: Annotated[int, Field(ge=2)] = Field(
+        default=400, description="How many frequencies; those of resonances are among them"
+    )
+
+
+@router.get("", response_model=FrequencyResponses, responses=problems(404, 409, 422, 503), dependencies=[HEAVY])
+def frequency_response_of_controller(
+    request: Request,
+    ident: DesignId,
+    name: ControllerName,
+    wanted: Annotated[WantedResponses, Query()],
+    designs: DesignsHere,
+    settings: SettingsHere,
+) -> Response:
+    """Loop, S, T and KS at the actuators' commands, and the transfers of reference, disturbances and noise.
+
+    Transport delays are in them exactly. The loop is the one that is opened at all commands at once.
+    """
+    check_size("/count", "frequencies", wanted.count, "max_response_samples", settings)
+    envelope = designs.envelope(ident)
+    controller = controller_of(envelope, name)
+    loop = controller.loop.take(point_with_gains(envelope, controller, wanted.point))
+    found = poles(loop.closed)
+    low, high = _range(found, wanted)
+    omega = response_frequencies(found, low, high, wanted.count)
+    document = {"name": name, "point": wanted.point}
+    return answer(request, encode(document | frequency_response_document(loop, omega)))
+
+
+def _range(found: ComplexArray, wanted: WantedResponses) -> tuple[float, float]:
+    """First and last frequency [rad/s].
+
+    Raises
+    ------
+    InvalidRequest : the first is not below the last
+    """
+    size = np.abs(found)[np.abs(found) > 0.0]
+    slowest, fastest = (float(size.min()), float(size.max())) if size.size else (1.0, 1.0)
+    low = wanted.from_ or 10.0 ** np.floor(np.log10(slowest) - 1.0)
+    high = wanted.to or 10.0 ** np.ceil(np.log10(fastest) + 0.5)
+    if not low < high:
+        detail = f"the first frequency, {low:g} rad/s, is not below the last, {high:g} rad/s"
+        raise InvalidRequest(f"/from: {detail}", FieldRefusal("/from", detail, "rad/s", f"< {high:g}"))
+    return low, high
