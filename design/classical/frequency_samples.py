@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from design.classical.figure import Figure, outer
 from design.classical.log_response import Factors
 from design.classical.normal_form import NormalForm
 from design.classical.open_gains import OpenGains
@@ -114,6 +115,17 @@ class FrequencySamples(GridArrays):
         }
         found += [self._summits(kind, np.log(heights[kind]() / difference)) for kind in SUMMITS if kind in kinds]
         return found
+
+    def at_top(self, z: FloatArray, level: float) -> Figure:
+        """Logarithm of ``|L|`` over a level, where the samples end, of K = P candidates z (K, J).
+
+        What is beyond is not looked at.
+        """
+        rows = self.loop[:, :, -1]
+        L = rows[:, 0] + (z * rows[:, 1:]).sum(axis=-1)
+        by = rows[:, 1:] / L[:, None]
+        there = np.ones((1, L.size), dtype=bool)
+        return Figure(np.log(np.abs(L) / level)[None], by.real[None], -outer(by).real[None], there)
 
     def _noise(self, weights: FloatArray, rate_command: bool) -> FloatArray:
         """Squared magnitude (K, W) of the commanded deflection over that of the noise, over that of S."""

@@ -84,7 +84,7 @@ def quick(family: OpenGains, reference: StepReference, specs: tuple[Spec, ...]) 
         begin = np.concatenate([begin[0], begin[1:, ~near].reshape(-1, j)])
         problem = problem.take(at)
         judged = problem.judge(np.maximum(begin, problem.family.least))
-        hopeful = judged.values.stable & (judged.values.miss < HOPELESS)
+        hopeful = judged.values.stable & ((judged.values.miss < HOPELESS) | (problem.family.form.lag < FAST_DRIVE))
         hopeful |= np.bincount(at, hopeful, points)[at] == 0
         ascent = Ascent(problem, begin, judged)
         ascent.stop(~hopeful)

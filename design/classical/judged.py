@@ -25,7 +25,7 @@ class Values(GridArrays):
         tightened are all met more strictly than they ask
     achieved : (K, S) value of each spec's quantity; nan where it does not exist, or was not worked out
     missed : (K, S) by how much each spec is missed, as a part of its limit; at most 0 when it is met
-    miss : (K,) the largest miss of the specs that are not tightened
+    miss : (K,) the largest miss of the specs that are not tightened, and of what bounds the loop transfer
     stable : (K,) mask; of the others the rest means nothing
     """
 

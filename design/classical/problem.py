@@ -16,7 +16,7 @@ from design.classical.frequency_samples import OF_FREQUENCY
 from design.classical.judged import UNSTABLE, Judged, Slopes, Values
 from design.classical.open_gains import OpenGains
 from design.classical.pole_figures import Poles
-from design.classical.requirement import IN_HAND, Requirement
+from design.classical.requirement import AT_TOP, IN_HAND, Requirement
 from design.classical.steering import StepReference
 from design.classical.step_figures import BAND, StepFigures, StepLoops
 from design.classical.walls import Settled, Walls
@@ -39,7 +39,7 @@ class Problem(GridArrays):
     frequency, loops : what figures are worked out from
     requirements : one for each spec
     tightens : whether specs are tightened; else the bandwidth is made largest
-    band : of the settled error, with a part in hand
+    band, top : of the settled error, and of the loop transfer where its samples end, with a part in hand
     fineness : how many times as many samples
     """
 
@@ -49,6 +49,7 @@ class Problem(GridArrays):
     requirements: tuple[Requirement, ...]
     tightens: bool
     band: float
+    top: float
     fineness: int
 
     @classmethod
@@ -77,6 +78,7 @@ class Problem(GridArrays):
             tuple(Requirement.of(spec, points, float(give), in_hand) for spec, give in zip(specs, which, strict=True)),
             tightened is not None,
             BAND * (1.0 - OF_BAND * in_hand),
+            AT_TOP * (1.0 - in_hand),
             fineness,
         )
 
@@ -104,6 +106,7 @@ class _Figures:
         self._step = StepFigures(problem.loops, self._poles, z, problem.fineness)
         self._settled: Settled | None = None
         self._figures = problem.frequency.judge(z, passes)
+        self._top = problem.frequency.samples.at_top(z, problem.top)
         for kind, figure in (("tab_rate", self._step.tab_rate), ("tab_deflection", self._step.tab_deflection)):
             if kind in self._asked:
                 self._figures[kind] = figure()
@@ -144,7 +147,7 @@ class _Figures:
             if settling is not None:
                 by = np.maximum(settling.limit - part * settling.give * settling.scale, 0.0)
                 _, self._settled = self._step.of_error(False, by, problem.band)
-        walls = Walls.of(problem.requirements, self._figures, self._poles, self._settled, part)
+        walls = Walls.of(problem.requirements, self._figures, self._top, self._poles, self._settled, part)
         bandwidth = self._figures["bandwidth"]
         slope, bend = bandwidth.gradient[0], bandwidth.curvature[0]
         if problem.tightens:
@@ -163,12 +166,14 @@ class _Figures:
         if r.sign < 0.0:
             none = 2.0 if r.quantity == "disk_margin" else np.inf
             return np.asarray(np.where(figure.exists, figure.value, none).min(axis=0))
-        least = 1.0 if r.quantity == "sensitivity_peak" else 0.0
-        return np.asarray(np.where(figure.exists, figure.value, least).max(axis=0, initial=least))
+        # At rest the loop undoes what it hears: the command is the noise over K_ss, whatever the gains.
+        least = {"sensitivity_peak": np.ones(1), "noise_gain": self._problem.frequency.noise_unit}
+        largest = np.where(figure.exists, figure.value, 0.0).max(axis=0)
+        return np.asarray(np.maximum(largest, least.get(r.quantity, np.zeros(1))))
 
     def _parts(self, missed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The part (K,) by which the specs that are tightened are all met, and the largest miss (K,) of the others."""
-        part, miss = np.full(missed.shape[0], np.inf), np.full(missed.shape[0], -np.inf)
+        part, miss = np.full(missed.shape[0], np.inf), self._top.value[0]
         for s, r in enumerate(self._problem.requirements):
             if not self._problem.tightens:
                 miss = np.maximum(miss, missed[:, s])

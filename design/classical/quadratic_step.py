@@ -112,7 +112,8 @@ def _best_part(
     walls = np.maximum(excess[:, None] + at[..., None] * rate[:, None], 0.0)
     slopes = start[:, None] + at * rise[:, None] + (walls * (spring * rate)[:, None]).sum(axis=-1)
     # Between the last place where it still falls and the next one it is a line.
-    k = np.minimum((slopes < 0.0).sum(axis=-1), at.shape[-1] - 1)[:, None]
-    low, high, f, g = (np.take_along_axis(a, np.maximum(k - d, 0), axis=-1)[:, 0] for a in (at, slopes) for d in (1, 0))
+    row, k = np.arange(at.shape[0]), np.minimum((slopes < 0.0).sum(axis=-1), at.shape[-1] - 1)
+    before = np.maximum(k - 1, 0)
+    low, high, f, g = at[row, before], at[row, k], slopes[row, before], slopes[row, k]
     inside = (f < 0.0) & (g > 0.0)
     return np.where(inside, low - f * (high - low) / np.where(inside, g - f, 1.0), np.where(g <= 0.0, 1.0, low))

@@ -16,6 +16,9 @@ IN_HAND = 1e-3
 ABSENT = -1e3
 #: What a stable loop is asked for in any case, so that it is not next to unstable: this damping ratio.
 LEAST_DAMPING = 0.01
+#: The most that the loop transfer may be where the frequency response ends, a multiple of what the drive allows: loops
+#: that bear any gain have no largest bandwidth, and this bounds it.
+AT_TOP = 0.5
 #: How the settling's wall counts against a part of a limit.
 SETTLING_SCALE = 0.25
 

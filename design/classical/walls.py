@@ -55,13 +55,18 @@ class Walls:
         cls,
         requirements: tuple[Requirement, ...],
         figures: dict[str, Figure],
+        top: Figure,
         poles: Poles,
         settled: Settled | None,
         part: FloatArray,
     ) -> Walls:
-        """Walls of every requirement, tightened by the `part` (K,)."""
+        """Walls of every requirement, tightened by the `part` (K,), and of what bounds the loop at the `top`."""
         made, slopes, offsets, gives = _damping_walls(requirements, poles, part)
         damping = sum(len(give) for give in gives)
+        made.append(top)
+        slopes.append(np.ones(part.shape))
+        offsets.append(np.zeros(part.shape))
+        gives.append(np.zeros(top.value.shape))
         for r in requirements:
             if r.quantity == "damping_ratio":
                 continue
