@@ -13,7 +13,8 @@ from design.delay.delayed_poles import delayed_poles
 from design.delay.step_response import delayed_step_response
 from design.delay.with_pade import without_delay
 from design.disturbance.noise_gain import noise_gain
-from design.frequency.margins import Margins, margins
+from design.estimation.cut_margins import margins_of_cuts
+from design.frequency.margins import Margins
 from design.frequency.poles import largest_real_part, least_damping_ratio, poles
 from design.frequency.sampled import sampled_margins, sampled_poles
 from design.frequency.sampled_loop import SampledLoop
@@ -81,7 +82,7 @@ def assess(
         poles=found,
         damping_ratio=damping,
         largest_real_part=growth,
-        margins=_margins_of_cuts(loop) if digital is None else _margins_of_sampled_cuts(digital),
+        margins=margins_of_cuts(loop) if digital is None else _margins_of_sampled_cuts(digital),
         step=step_metrics(chained, response, "da", reference),
         demand=actuator_demands(chained, response, loop.inputs),
         actuators=loop.inputs,
@@ -110,14 +111,6 @@ def _sampled_poles(loop: SampledLoop) -> tuple[ComplexArray, FloatArray, FloatAr
 def _margins_of_sampled_cuts(loop: SampledLoop) -> tuple[Margins, ...]:
     stacked = sampled_margins(loop.cuts())
     return tuple(stacked.take(i) for i in range(len(loop.inputs)))
-
-
-def _margins_of_cuts(loop: Loop) -> tuple[Margins, ...]:
-    """Margins at every actuator input; one batch where the inputs' delays allow it."""
-    if len(set(loop.delay)) == 1:
-        stacked = margins(loop.cuts())
-        return tuple(stacked.take(i) for i in range(len(loop.inputs)))
-    return tuple(margins(loop.cut(name)) for name in loop.inputs)
 
 
 def achieved(assessment: Assessment, quantity: str) -> FloatArray | None:

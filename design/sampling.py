@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from design.estimation.readings import is_controllers
 from design.frequency.sampled_loop import Realisation, SampledLoop, sampled_loop, tustin
 from design.loop import Loop
-
-#: States that are inside the controller.
-CONTROLLER_STATES = ("int_a", "int_t", "da_filtered")
 
 
 @dataclass(frozen=True)
@@ -35,13 +33,13 @@ def digital_loop(loop: Loop, sampling: Sampling) -> SampledLoop:
 
     Parameters
     ----------
-    loop : with the delays of its actuators; `CONTROLLER_STATES` become the controller's, all others are the plant's
+    loop : with the delays of its actuators; which states are the controller's, `design.estimation.readings` says
 
     Raises
     ------
     ValueError : commands drive a state of the controller, or the plant does
     """
-    inside = [i for i, name in enumerate(loop.states) if name in CONTROLLER_STATES]
+    inside = [i for i, name in enumerate(loop.states) if is_controllers(name)]
     outside = [i for i in range(len(loop.states)) if i not in inside]
     if np.any(loop.B[..., inside, :]) or np.any(loop.A[..., outside, :][..., inside]):
         raise ValueError("a controller's own states act on the plant through the commands only")

@@ -55,7 +55,7 @@ def judged(
     if not np.any(ok):
         none = np.full(ok.shape, np.nan)
         return DesignedController(request, outcomes, gains, loop, None, none.astype(complex), none, (), riccati)
-    step, duration = np.array([study.reference.aileron]), horizon(study, request)
+    step, duration = study.reference.sizes(loop.references), horizon(study, request)
     try:
         found = assess(loop.take(ok), step, duration, sampling=_sampling(request)).spread(ok)
         fastest = _fastest_mode(request, loop, ok)
@@ -74,7 +74,7 @@ def judged(
 
 def figures_at(study: Study, request: Controller, loop: Loop, where: BoolArray) -> Assessment | None:
     """The loop's figures at the points of a mask, in one row; None where their numbers cannot be judged together."""
-    step, duration = np.array([study.reference.aileron]), horizon(study, request)
+    step, duration = study.reference.sizes(loop.references), horizon(study, request)
     try:
         return assess(loop.take(where), step, duration, sampling=_sampling(request))
     except np.linalg.LinAlgError:

@@ -109,7 +109,7 @@ class PointLimits:
         gains = dict(zip(self.names, values.T, strict=True))
         model, servo = self.plant.model.take(index), self.plant.servo_tab.take(index)
         loop = tab_loop(model, servo, self.study.tab_actuator, self.request, gains)
-        step, duration = np.array([self.study.reference.aileron]), horizon(self.study, self.request)
+        step, duration = self.study.reference.sizes(loop.references), horizon(self.study, self.request)
         found = assess(loop, step, duration, sampling=self.request.sampling)
         return np.column_stack([spec_distances(found, [s.take(index) for s in self.specs]), found.step.bandwidth])
 

@@ -17,9 +17,8 @@ from design.classical.synthesis import (
 )
 from design.classical.tab_loop import tab_loop
 from design.gains import Gain
-from design.loop import Loop
 from design.lqr.synthesis import LqrController, design_lqr
-from design.lqr.torque_loop import lqr_loop
+from design.lqr.torque_loop import gains, lqr_loop
 from design.lqr.weights import WeightsRefused
 from design.outcome import Outcomes
 from schedules.analysis import PlantEnvelope, analyse
@@ -111,35 +110,7 @@ def _flown(
 
 def _lqr(study: Study, plant: PlantEnvelope, request: LqrController) -> DesignedController:
     try:
-        found = design_lqr(plant.model, request, plant.outcomes)
+        found = design_lqr(plant.model, request, plant.outcomes, study.tab_actuator, study.aileron_actuator)
     except WeightsRefused as refused:
         raise ControllerRefused(request.name, refused) from refused
-    loop = lqr_loop(plant.model, found)
-    return judged(study, plant, request, found.outcomes, _matrix_gains(loop, plant.model.inputs), loop, found)
-
-
-#: Unit of a torque gain on each state.
-_TORQUE_GAIN_UNITS = {
-    "dt": "N m/rad",
-    "da": "N m/rad",
-    "dt_rate": "N m s/rad",
-    "da_rate": "N m s/rad",
-    "int_a": "N m/(rad s)",
-    "lag_1": "N m/rad",
-    "lag_2": "N m/rad",
-}
-
-
-def _matrix_gains(loop: Loop, inputs: tuple[str, ...]) -> tuple[Gain, ...]:
-    """``K_<input>_<state>`` and ``N_<input>_<reference>`` of a state-feedback loop."""
-    feedback = [
-        Gain(f"K_{u}_{x}", _TORQUE_GAIN_UNITS[x], loop.K[..., i, j])
-        for i, u in enumerate(inputs)
-        for j, x in enumerate(loop.states)
-    ]
-    forward = [
-        Gain(f"N_{u}_{r}", "N m/rad", loop.N[..., i, j])
-        for i, u in enumerate(inputs)
-        for j, r in enumerate(loop.references)
-    ]
-    return (*feedback, *forward)
+    return judged(study, plant, request, found.outcomes, gains(found), lqr_loop(plant.model, found), found)

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from design.classical.controller import ClassicalController
 from design.lqr.synthesis import LqrController
 from design.specs import SPEC_PACKS, Spec
 from model.actuators import Actuator
 from model.aerodynamics import Aerodynamics
+from model.arrays import FloatArray
 from model.flight import SpeedAxis
 from model.section import Geometry, Inertia
 from model.trim import TrimRequest
@@ -29,17 +32,24 @@ class GridRequest:
 
 @dataclass(frozen=True)
 class Reference:
-    """The manoeuvre that actuators are judged on: a step of the aileron from trim.
+    """The manoeuvre that actuators are judged on: a step from trim.
 
     Attributes
     ----------
-    aileron : step size [rad]
+    aileron : size of the aileron's step [rad]
     duration : how long the response is followed [s]
+    tab : size of the tab's step [rad], where the tab has a reference of its own
     """
 
     aileron: float
     duration: float
+    tab: float = 0.0
     kind: Literal["step"] = "step"
+
+    def sizes(self, references: tuple[str, ...]) -> FloatArray:
+        """Step of each of a loop's references (p,) [rad]."""
+        of = {"r_a": self.aileron, "r_t": self.tab}
+        return np.array([of[name] for name in references])
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,8 @@
-"""The linear-quadratic regulator problem over the grid: cross term removed, scaled, checked point by point."""
+"""The linear-quadratic regulator problem over the grid: cross term removed, scaled, checked point by point.
+
+In continuous and in discrete time: ``x' = A x + B u`` or ``x+ = A x + B u``, an integral or a sum of
+``x'Qx + u'Ru + 2x'Nu``.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +16,22 @@ from model.arrays import BoolArray, FloatArray, IntArray
 
 #: Weights less symmetric than this, relative to their largest entry, are not a quadratic form.
 ASYMMETRY = 1e-9
+#: An eigenvalue of ``Q - N R^-1 N'`` this much below zero, relative and on a unit diagonal, is still rounding.
+NEGATIVE_WEIGHT = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class RiccatiEquation:
     """``A'X + XA - X F F' X + Q = 0`` in states and a time scaled by powers of two (no rounding).
 
+    In discrete time ``A'XA - X - A'XF (I + F'XF)^-1 F'XA + Q = 0`` in scaled states.
+
     Attributes
     ----------
-    A (N, n, n), F (N, n, m), Q (N, n, n) : the scaled equation, largest entry of its Hamiltonian about 1
+    A (N, n, n), F (N, n, m), Q (N, n, n) : the scaled equation; in continuous time the largest entry of its
+        Hamiltonian is about 1
     state_exponent : (N, n) tau: ``x = 2^tau x'`` state by state
-    time_exponent : (N,) k, even: ``A = 2^-k`` times the unscaled one
+    time_exponent : (N,) k, even: ``A = 2^-k`` times the unscaled one; 0 in discrete time
     """
 
     A: FloatArray
@@ -36,7 +45,7 @@ class RiccatiEquation:
         """``F F'`` (N, n, n)."""
         return np.asarray(self.F @ self.F.mT)
 
-    def take(self, index: IntArray) -> RiccatiEquation:
+    def take(self, index: IntArray | slice) -> RiccatiEquation:
         """The equation at some of the points."""
         return RiccatiEquation(
             self.A[index], self.F[index], self.Q[index], self.state_exponent[index], self.time_exponent[index]
@@ -64,23 +73,25 @@ class RiccatiEquation:
         tau = self.state_exponent
         return np.asarray(np.ldexp(X, -(tau[:, :, None] + tau[:, None, :])))
 
-    def feedback_in_states(self, X: FloatArray) -> FloatArray:
-        """``F'X`` (N, m, n) of the scaled equation, in the states' own units."""
+    def gain_in_states(self, gain: FloatArray) -> FloatArray:
+        """A gain (N, m, n) on the scaled states, ``F'X`` in continuous time, on the states in their own units."""
         exponent = self.time_exponent[:, None, None] // 2 - self.state_exponent[:, None, :]
-        return np.asarray(np.ldexp(self.F.mT @ X, exponent))
+        return np.asarray(np.ldexp(gain, exponent))
 
 
 @dataclass(frozen=True, eq=False)
 class RegulatorProblem:
-    """Minimise ``int( x'Qx + u'Ru + 2x'Nu ) dt`` for ``x' = A x + B u``, over N points.
+    """Minimise the integral or the sum of ``x'Qx + u'Ru + 2x'Nu``, over N points.
 
     Attributes
     ----------
     A (N, n, n), B (N, n, m) : the plant
     S : (N or 1, m, m) ``R^-1 = S S'``
-    cross : (N or 1, m, n) ``R^-1 N'``; the gain is ``S F'X + cross``
-    posed : (N,) data finite, Q and R symmetric, R positive definite; elsewhere `equation` is a harmless one
+    cross : (N or 1, m, n) ``R^-1 N'``, to be added to S times the gain of `equation`
+    posed : (N,) data finite, Q and R symmetric, R positive definite; in discrete time, where weights differ from
+        point to point, also ``Q - N R^-1 N'`` positive semidefinite. Elsewhere `equation` is a harmless one
     equation : of ``A - B R^-1 N'`` and ``Q - N R^-1 N'``
+    discrete : in discrete time
     """
 
     A: FloatArray
@@ -89,16 +100,19 @@ class RegulatorProblem:
     cross: FloatArray
     posed: BoolArray
     equation: RiccatiEquation
+    discrete: bool
 
-    def take(self, index: IntArray) -> RegulatorProblem:
+    def take(self, index: IntArray | slice) -> RegulatorProblem:
         """The problem at some of the points."""
         S = self.S if len(self.S) == 1 else self.S[index]
         cross = self.cross if len(self.cross) == 1 else self.cross[index]
-        return RegulatorProblem(self.A[index], self.B[index], S, cross, self.posed[index], self.equation.take(index))
+        return RegulatorProblem(
+            self.A[index], self.B[index], S, cross, self.posed[index], self.equation.take(index), self.discrete
+        )
 
 
 def regulator_problem(
-    A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, N: FloatArray | None = None
+    A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, N: FloatArray | None = None, discrete: bool = False
 ) -> RegulatorProblem:
     """The problem with its grid flattened to N points; numpy's floating-point warnings are the caller's.
 
@@ -106,6 +120,7 @@ def regulator_problem(
     ----------
     A (*G, n, n), B (*G, n, m) : the plant
     Q (n, n), R (m, m), N (n, m) or None : weights, with or without the grid's axes
+    discrete : in discrete time
 
     Raises
     ------
@@ -116,6 +131,7 @@ def regulator_problem(
     A, B, Q = A.reshape(-1, n, n), B.reshape(-1, n, m), Q.reshape(-1, n, n)
     S, posed = inverse_root(R.reshape(-1, m, m))
     posed = posed & symmetric(Q)
+    unit = np.diagonal(Q, axis1=-2, axis2=-1)
     reduced, cross = A, np.zeros((1, m, n))
     if N is not None:
         half = S.mT @ N.reshape(-1, n, m).mT
@@ -124,9 +140,11 @@ def regulator_problem(
         posed = posed & finite(Q)
     F = B @ S
     posed = posed & finite(reduced) & finite(F)
+    if discrete:
+        posed = posed & semidefinite(Q, unit)
     if not posed.all():
         known = posed[:, None, None]
-        reduced, F = np.where(known, reduced, -np.eye(n)), np.where(known, F, 0.0)
+        reduced, F = np.where(known, reduced, -0.5 * np.eye(n)), np.where(known, F, 0.0)
         Q = np.where(known, Q, np.eye(n))
     return RegulatorProblem(
         A=A,
@@ -134,7 +152,8 @@ def regulator_problem(
         S=S,
         cross=cross,
         posed=posed,
-        equation=scaled_equation(reduced, F, 0.5 * (Q + Q.mT)),
+        equation=scaled_equation(reduced, F, 0.5 * (Q + Q.mT), discrete),
+        discrete=discrete,
     )
 
 
@@ -160,13 +179,14 @@ def inverse_root(R: FloatArray) -> tuple[FloatArray, BoolArray]:
     """
     diagonal = np.diagonal(R, axis1=-2, axis2=-1)
     definite = symmetric(R) & np.all(diagonal > 0, axis=-1)
-    unit = 1.0 / np.sqrt(np.where(definite[:, None], diagonal, 1.0))
-    scaled = np.where(definite[:, None, None], R, np.eye(R.shape[-1])) * unit[:, :, None] * unit[:, None, :]
-    values, vectors = np.linalg.eigh(scaled)
+    if not definite.all():
+        R = np.where(definite[:, None, None], R, np.eye(R.shape[-1]))
+        diagonal = np.diagonal(R, axis1=-2, axis2=-1)
+    unit = 1.0 / np.sqrt(diagonal)
+    values, vectors = np.linalg.eigh(R * unit[:, :, None] * unit[:, None, :])
     definite = definite & (values[:, 0] > R.shape[-1] * np.finfo(float).eps)
-    values = np.where(definite[:, None], values, 1.0)
-    S = unit[:, :, None] * vectors / np.sqrt(values)[:, None, :]
-    return np.where(definite[:, None, None], S, 0.0), definite
+    S = unit[:, :, None] * vectors / np.sqrt(np.maximum(values, np.finfo(float).tiny))[:, None, :]
+    return S if definite.all() else np.where(definite[:, None, None], S, 0.0), definite
 
 
 def finite(matrix: FloatArray) -> BoolArray:
@@ -181,11 +201,30 @@ def symmetric(matrix: FloatArray) -> BoolArray:
     return np.asarray((skew <= ASYMMETRY * size) & np.isfinite(size))
 
 
-def scaled_equation(A: FloatArray, F: FloatArray, Q: FloatArray) -> RiccatiEquation:
-    """The equation of A (N, n, n), F (N, n, m), Q (N or 1, n, n), balanced, its Hamiltonian of order one."""
+def semidefinite(matrix: FloatArray, diagonal: FloatArray) -> BoolArray:
+    """Mask of the points where a symmetric matrix is positive semidefinite up to rounding.
+
+    Parameters
+    ----------
+    matrix : (N, n, n)
+    diagonal : (N or 1, n) of what the matrix was computed from: the size of its rounding errors
+    """
+    size = np.maximum(np.abs(diagonal), np.abs(np.diagonal(matrix, axis1=-2, axis2=-1)))
+    unit = 1.0 / np.sqrt(np.where(size > 0, size, 1.0))
+    scaled = matrix * unit[:, :, None] * unit[:, None, :]
+    known = finite(scaled)
+    lowest = np.linalg.eigvalsh(np.where(known[:, None, None], scaled, 0.0))[:, 0]
+    return np.asarray(known & (lowest >= -NEGATIVE_WEIGHT))
+
+
+def scaled_equation(A: FloatArray, F: FloatArray, Q: FloatArray, discrete: bool = False) -> RiccatiEquation:
+    """The equation of A (N, n, n), F (N, n, m), Q (N or 1, n, n), balanced, its Hamiltonian of order one.
+
+    In discrete time it is the states that are balanced only: the unit of time is the sample.
+    """
     exponents = balance_exponents(A, F, Q)
     tau, size = exponents[:, :-1], exponents[:, -1]
-    k = 2 * ((size + 1) // 2)
+    k = np.zeros_like(size) if discrete else 2 * ((size + 1) // 2)
     row, column, time = tau[:, :, None], tau[:, None, :], k[:, None, None]
     return RiccatiEquation(
         A=np.ldexp(A, column - row - time),

@@ -3,10 +3,11 @@
 With ``R > 0`` and ``Q - N R^-1 N' >= 0`` the stabilising solution exists exactly when (Kucera 1972) ::
 
     (A, B) is stabilisable, and
-    (Q - N R^-1 N', A - B R^-1 N') has no unobservable mode on the imaginary axis.
+    (Q - N R^-1 N', A - B R^-1 N') has no unobservable mode on the boundary of stability:
+    the imaginary axis, in discrete time the unit circle.
 
-An unobservable mode in the right half plane is no obstacle: the stabilising solution mirrors it into the left
-half plane, at the least cost of control. One on the axis mirrors into itself, so no feedback of this kind moves it.
+An unobservable unstable mode is no obstacle: the stabilising solution mirrors it into the stable region, at the least
+cost of control. One on the boundary mirrors into itself, so no feedback of this kind moves it.
 Both conditions are rank tests (Popov, Belevitch, Hautus) in balanced coordinates, with A, the columns of B
 and the rows of Q scaled to unit size: how strongly an input acts or a state is weighted does not matter,
 only whether.
@@ -18,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.lqr.regulator import RegulatorProblem, RiccatiEquation, regulator_problem
+from design.lqr.regulator import RegulatorProblem, regulator_problem
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, ObjectArray
 
 #: A singular value below this, relative to the balanced matrices, is a loss of rank.
@@ -35,9 +36,9 @@ class Solvability(GridArrays):
     ----------
     control_distance : (*G,) smallest singular value of ``[sI - A, B]`` over the eigenvalues s of A that are not
         stable; inf where all are
-    observation_distance : (*G,) smallest singular value of ``[jwI - A; Q]`` over the axis
-    uncontrolled : (*G,) the eigenvalue of A [1/s] that the first is smallest at
-    unobserved : (*G,) the point of the axis [1/s] that the second is smallest at
+    observation_distance : (*G,) smallest singular value of ``[sI - A; Q]`` over the s of the boundary of stability
+    uncontrolled : (*G,) the eigenvalue of A that the first is smallest at [1/s; in discrete time 1]
+    unobserved : (*G,) the point of the boundary that the second is smallest at [1/s; in discrete time 1]
     reasons : (*G,) object array of str, None where the problem has a stabilising solution
     """
 
@@ -54,17 +55,20 @@ class Solvability(GridArrays):
 
     @property
     def observable_on_axis(self) -> BoolArray:
-        """(*G,) every mode on the imaginary axis is seen by Q."""
+        """(*G,) every mode on the boundary of stability is seen by Q."""
         return np.asarray(self.observation_distance > RANK)
 
 
-def solvability(A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, N: FloatArray | None = None) -> Solvability:
+def solvability(
+    A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, N: FloatArray | None = None, discrete: bool = False
+) -> Solvability:
     """Whether each point has a stabilising solution, and the eigenvalue which forbids it.
 
     Parameters
     ----------
     A (*G, n, n), B (*G, n, m) : the plant
     Q (n, n), R (m, m), N (n, m) or None : weights, with or without the grid's axes; R > 0, Q - N R^-1 N' >= 0
+    discrete : in discrete time
 
     Raises
     ------
@@ -72,7 +76,7 @@ def solvability(A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, N: F
     """
     grid = A.shape[:-2]
     with np.errstate(all="ignore"):
-        result = problem_solvability(regulator_problem(A, B, Q, R, N))
+        result = problem_solvability(regulator_problem(A, B, Q, R, N, discrete))
     return Solvability(
         result.control_distance.reshape(grid),
         result.observation_distance.reshape(grid),
@@ -86,44 +90,53 @@ def problem_solvability(problem: RegulatorProblem) -> Solvability:
     """`solvability` of a problem over N points."""
     equation = problem.equation.unscaled()
     eigenvalues = np.linalg.eigvals(equation.A).astype(complex)
-    control, uncontrolled = _control_distance(equation, eigenvalues)
-    observation, unobserved = _observation_distance(equation, eigenvalues)
+    if problem.discrete:
+        size = np.abs(eigenvalues)
+        stable, boundary = size < 1.0 - RANK, np.where(size > 0, eigenvalues / size, 1.0)
+    else:
+        stable, boundary = eigenvalues.real < -RANK * _size(equation.A)[:, 0], 1j * eigenvalues.imag
+    distance = np.where(stable, np.inf, _rank_distance(eigenvalues, equation.A, equation.F))
+    control, uncontrolled = _worst(distance, eigenvalues)
+    observation, unobserved = _worst(_rank_distance(boundary, equation.A.mT, equation.Q), boundary)
     reasons = np.full(len(control), None, dtype=object)
     for i in np.flatnonzero(~problem.posed | (control <= RANK) | (observation <= RANK)):
         if not problem.posed[i]:
-            reasons[i] = "R is not positive definite, Q is not symmetric, or the data are not finite"
+            reasons[i] = _not_posed(problem)
         elif control[i] <= RANK:
-            reasons[i] = f"(A, B) is not stabilisable: no input reaches the mode at {_rate(uncontrolled[i])} 1/s"
+            reasons[i] = f"(A, B) is not stabilisable: no input reaches the mode at {_mode(uncontrolled[i], problem)}"
         else:
-            matrix = "Q - N R^-1 N'" if np.any(problem.cross) else "Q"
+            where = "unit circle" if problem.discrete else "imaginary axis"
             reasons[i] = (
-                f"{matrix} does not see the mode at {_rate(unobserved[i])} 1/s on the imaginary axis: "
+                f"{_weight(problem)} does not see the mode at {_mode(unobserved[i], problem)} on the {where}: "
                 "no stabilising solution; give that mode a weight"
             )
     return Solvability(control, observation, uncontrolled, unobserved, reasons)
+
+
+def distance_from_unsolvable(problem: RegulatorProblem) -> FloatArray:
+    """The smaller of both distances (N,)."""
+    solvable = problem_solvability(problem)
+    return np.minimum(solvable.control_distance, solvable.observation_distance)
+
+
+def _not_posed(problem: RegulatorProblem) -> str:
+    semidefinite = f", {_weight(problem)} is not positive semidefinite" if problem.discrete else ""
+    return f"R is not positive definite, Q is not symmetric{semidefinite}, or the data are not finite"
+
+
+def _weight(problem: RegulatorProblem) -> str:
+    return "Q - N R^-1 N'" if np.any(problem.cross) else "Q"
+
+
+def _mode(s: complex, problem: RegulatorProblem) -> str:
+    value = f"{s.real:.6g}" if s.imag == 0 else f"{s.real:.6g}{s.imag:+.6g}j"
+    return f"z = {value}" if problem.discrete else f"{value} 1/s"
 
 
 def _size(matrix: FloatArray) -> FloatArray:
     """Largest entry (N, 1, 1); 1 for a matrix of zeros."""
     size = np.max(np.abs(matrix), axis=(1, 2), keepdims=True)
     return np.where(size > 0, size, 1.0)
-
-
-def _rate(s: complex) -> str:
-    return f"{s.real:.6g}" if s.imag == 0 else f"{s.real:.6g}{s.imag:+.6g}j"
-
-
-def _control_distance(equation: RiccatiEquation, eigenvalues: ComplexArray) -> tuple[FloatArray, ComplexArray]:
-    """Smallest singular value of ``[sI - A, B]`` over the eigenvalues with ``Re s >= 0``, and that s."""
-    distance = _rank_distance(eigenvalues, equation.A, equation.F)
-    distance[eigenvalues.real < -RANK * _size(equation.A)[:, 0]] = np.inf
-    return _worst(distance, eigenvalues)
-
-
-def _observation_distance(equation: RiccatiEquation, eigenvalues: ComplexArray) -> tuple[FloatArray, ComplexArray]:
-    """Smallest singular value of ``[jwI - A; Q]`` at the points of the axis below the eigenvalues, and that jw."""
-    axis = np.asarray(1j * eigenvalues.imag, dtype=complex)
-    return _worst(_rank_distance(axis, equation.A.mT, equation.Q), axis)
 
 
 def _rank_distance(s: ComplexArray, A: FloatArray, B: FloatArray) -> FloatArray:

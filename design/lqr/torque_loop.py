@@ -1,79 +1,51 @@
-"""The loop of concurrent actuation: both torques from all the states, the reference fed forward (seed chapter 5)."""
+"""The loop that an LQR design flies, and its gains by name (seed chapter 5)."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from design.gains import Gain
 from design.loop import Loop
+from design.lqr.flown import flown_loop
 from design.lqr.synthesis import LqrDesign
-from design.lqr.tracking import TrackingPlant, augment_with_integral
-from model.arrays import FloatArray
-from model.linear_model import LinearModel
+from model.linear_model import INPUTS, LinearModel
 
-INPUTS = ("tab", "aileron")
-ANGLES_AND_RATES = ("da", "dt", "da_rate", "dt_rate")
-MEASURED = ("dt", "dt_rate", "da", "da_rate")
-DISTURBANCES = ("T_t_disturbance", "T_a_disturbance", *(f"{state}_noise" for state in MEASURED))
-OUTPUTS = (*ANGLES_AND_RATES, "T_t", "T_a")
+_UNITS = {
+    "dt": "N m/rad",
+    "da": "N m/rad",
+    "dt_rate": "N m s/rad",
+    "da_rate": "N m s/rad",
+    "int_a": "N m/(rad s)",
+    "int_t": "N m/(rad s)",
+    "lag_1": "N m/rad",
+    "lag_2": "N m/rad",
+}
 
 
 def lqr_loop(model: LinearModel, design: LqrDesign) -> Loop:
-    """The loop that an LQR design flies, with ideal torque actuators, over the grid.
+    """The loop that an LQR design flies, over the grid.
 
-    Inputs are the torque commands of tab and aileron [N m from trim], the reference is ``r_a`` [rad from trim],
-    outputs are totals: angles [rad], rates [rad/s] and torques [N m] with their trim values. The stages are the
+    Inputs are the torque commands of tab and aileron [N m from trim], references the wanted angles [rad from trim],
+    outputs are totals: angles [rad], rates [rad/s], torques on the surfaces [N m] with their trim values, and the
+    commands of torques that lag them, as they reach the actuators. The stages are the
     loops opened at one actuator input with the other one closed, for root loci of that input's gain about
     the 1 that is flown. Every array is nan at the points whose outcome is not ok.
     """
-    plant = augment_with_integral(model)
+    loop = flown_loop(model, design.structure, design.K, design.N)
     ok = design.outcomes.ok
-    grid, n, m = ok.shape, len(plant.states), len(INPUTS)
-    outputs = len(OUTPUTS)
-    C, D = np.zeros((*grid, outputs, n)), np.zeros((*grid, outputs, m))
-    offset = np.zeros((*grid, outputs))
-    for row, name in enumerate(ANGLES_AND_RATES):
-        C[..., row, plant.states.index(name)] = 1.0
-        offset[..., row] = model.state_offset[..., model.states.index(name)]
-    D[..., -m:, :] = np.eye(m)
-    offset[..., -m:] = model.input_offset
-    G, M = _disturbances(plant, design.K)
-    hole = np.where(ok, 0.0, np.nan)
-    loop = Loop(
-        A=plant.A + hole[..., None, None],
-        B=plant.B + hole[..., None, None],
-        E=plant.E + hole[..., None, None],
-        G=G + hole[..., None, None],
-        K=design.K,
-        N=design.N,
-        M=M,
-        C=C + hole[..., None, None],
-        F=np.zeros((*grid, outputs, n)) + hole[..., None, None],
-        D=D + hole[..., None, None],
-        H=np.zeros((*grid, outputs, m)) + hole[..., None, None],
-        offset=offset + hole[..., None],
-        states=plant.states,
-        inputs=INPUTS,
-        references=("r_a",),
-        outputs=OUTPUTS,
-        disturbances=DISTURBANCES,
-        stages=(),
-        delay=(0.0, 0.0),
-    )
-    return replace(loop, stages=tuple(loop.cut(name) for name in INPUTS))
+    return loop if np.all(ok) else loop.take(ok).spread(ok)
 
 
-def _disturbances(plant: TrackingPlant, K: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """G (*G, n, 6) and M (*G, 2, 6) of `DISTURBANCES`: torques beside those of the actuators, noise of four sensors.
-
-    Noise enters the torques through the gain on its state, and that of the aileron's angle also the integral.
-    """
-    *grid, n, m = plant.B.shape
-    G, M = np.zeros((*grid, n, m + len(MEASURED))), np.zeros((*grid, m, m + len(MEASURED)))
-    G[..., :m] = plant.B
-    measured = [plant.states.index(name) for name in MEASURED]
-    M[..., m:] = -K[..., measured]
-    integral = plant.states.index("int_a")
-    G[..., integral, m:] = plant.A[..., integral, measured]
-    return G, M
+def gains(design: LqrDesign) -> tuple[Gain, ...]:
+    """``K_<input>_<state>`` and ``N_<input>_<reference>``, row by row; a gain on a torque has the unit 1."""
+    feedback = [
+        Gain(f"K_{u}_{x}", _UNITS.get(x, "1"), design.K[..., i, j])
+        for i, u in enumerate(INPUTS)
+        for j, x in enumerate(design.states)
+    ]
+    forward = [
+        Gain(f"N_{u}_{r}", "N m/rad", design.N[..., i, j])
+        for i, u in enumerate(INPUTS)
+        for j, r in enumerate(design.structure.references)
+    ]
+    return (*feedback, *forward)

@@ -1,7 +1,8 @@
 """Weights of the quadratic cost: Bryson's rule or explicit matrices, and what no solve can repair (seed 5.1).
 
-``int( x'Qx + u'Ru + 2x'Nu ) dt`` over the states ``dt dt_rate da da_rate int_a`` [rad, rad/s, rad s], with unsteady
-damping ``lag_1 lag_2`` [rad] after them, and the inputs ``T_t T_a`` [N m].
+``int( x'Qx + u'Ru + 2x'Nu ) dt`` over the states ``dt dt_rate da da_rate`` and the integrals ``int_a int_t``
+[rad, rad/s, rad s], and the inputs ``T_t T_a`` [N m]. What `design.lqr.structures` adds, the torques behind a lag, the
+lag states of unsteady damping and the states of delays, has no weight unless explicit matrices give it one.
 """
 
 from __future__ import annotations
@@ -17,10 +18,14 @@ from model.arrays import FloatArray
 WEIGHTED_STATES = ("dt", "dt_rate", "da", "da_rate", "int_a")
 WEIGHTED_INPUTS = ("T_t", "T_a")
 
+#: State -> the field of Bryson's rule that weighs it.
+_INTEGRALS = {"int_a": "aileron_integral", "int_t": "tab_integral"}
+_BRYSON = {"dt": "tab", "dt_rate": "tab_rate", "da": "aileron", "da_rate": "aileron_rate", **_INTEGRALS}
+
 #: An eigenvalue this much below zero, relative and on a unit diagonal, is still rounding.
 NEGATIVE = 1e-10
 
-WeightName = Literal["Q", "R", "N"]
+WeightName = Literal["Q", "R", "N", "W_y", "W_u"]
 
 
 class WeightsRefused(ValueError):
@@ -28,7 +33,7 @@ class WeightsRefused(ValueError):
 
     Attributes
     ----------
-    matrix : the matrix at fault: ``Q``, ``R`` or ``N``
+    matrix : the matrix at fault: ``Q``, ``R`` or ``N``; of output weights ``W_y`` or ``W_u``
     eigenvalue : the eigenvalue that shows it; of the matrix, or of the plant for a mode no weight sees. None
         where shape, symmetry or a number that is not finite is the fault
     reason : in words and numbers
@@ -49,30 +54,34 @@ class BrysonWeights:
     ----------
     aileron, tab : deflections [rad]
     aileron_rate, tab_rate : [rad/s]
-    aileron_integral : of the aileron's error [rad s]
+    aileron_integral : of the aileron's error [rad s]; None where the aileron has no reference
     tab_torque, aileron_torque : deviations from trim [N m]
+    tab_integral : of the tab's error [rad s]; None where the tab has no reference
     """
 
     aileron: float
     aileron_rate: float
     tab: float
     tab_rate: float
-    aileron_integral: float
+    aileron_integral: float | None
     tab_torque: float
     aileron_torque: float
+    tab_integral: float | None = None
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (np.isfinite(value) and value > 0):
+            if value is None and field.name in _INTEGRALS.values():
+                continue
+            if value is None or not (np.isfinite(value) and value > 0):
                 raise ValueError(f"{field.name}: the largest acceptable value must be positive, not {value}")
 
 
 @dataclass(frozen=True, eq=False)
 class ExplicitWeights:
-    """Q (n, n), R (2, 2), N (n, 2) or None, in SI and radians over all states and `WEIGHTED_INPUTS`.
+    """Q (n, n), R (2, 2), N (n, 2) or None, in SI and radians over states and `WEIGHTED_INPUTS`.
 
-    n is 5, `WEIGHTED_STATES`; with the two lag states of unsteady damping after them 7.
+    n is the number of `Structure.weighted_states`, and every other state has no weight; or that of all the states.
     """
 
     Q: FloatArray
@@ -91,12 +100,19 @@ class ExplicitWeights:
 def weight_matrices(
     weights: BrysonWeights | ExplicitWeights, states: tuple[str, ...] = WEIGHTED_STATES
 ) -> ExplicitWeights:
-    """Q, R and N of either kind of weights, over `states`; Bryson's rule weighs none but `WEIGHTED_STATES`."""
+    """Q, R and N of either kind of weights; those of Bryson's rule are over `states`, of which it weighs what it knows.
+
+    Raises
+    ------
+    WeightsRefused : Bryson's rule without a value for an integral that is among the states
+    """
     if isinstance(weights, ExplicitWeights):
         return weights
-    largest = (weights.tab, weights.tab_rate, weights.aileron, weights.aileron_rate, weights.aileron_integral)
-    acceptable = dict(zip(WEIGHTED_STATES, largest, strict=True))
-    values = [acceptable.get(state, np.inf) for state in states]
+    for state, name in _INTEGRALS.items():
+        if state in states and getattr(weights, name) is None:
+            reason = f"{name} is missing: Q would not see the mode at 0 1/s of the integral {state}"
+            raise WeightsRefused("Q", 0j, reason)
+    values = [getattr(weights, _BRYSON[state]) if state in _BRYSON else np.inf for state in states]
     inputs = (weights.tab_torque, weights.aileron_torque)
     # A value too small to square makes an infinite weight, which `check_weights` refuses.
     with np.errstate(over="ignore", divide="ignore"):
@@ -123,14 +139,42 @@ def check_weights(Q: FloatArray, R: FloatArray, N: FloatArray | None = None, tol
     """
     n, m = len(Q), len(R)
     _check_matrix("Q", Q, (n, n))
-    _check_matrix("R", R, (m, m))
-    _check_definite(R)
-    _check_semidefinite("Q", Q, Q, tolerance)
+    check_definite(R, (m, m))
+    check_semidefinite(Q, (n, n), tolerance=tolerance)
     if N is not None:
         _check_matrix("N", N, (n, m))
         with np.errstate(over="ignore", invalid="ignore"):
             reduced = Q - N @ np.linalg.solve(R, N.T)
-        _check_semidefinite("N", reduced, Q, tolerance)
+        _refuse_negative("N", "Q - N R^-1 N'", reduced, Q, tolerance)
+
+
+def check_definite(matrix: FloatArray, shape: tuple[int, int], name: WeightName = "R") -> None:
+    """Refuse a weight of inputs of another shape, or not positive definite with the margin that its inverse needs.
+
+    Raises
+    ------
+    WeightsRefused : names the matrix and its eigenvalue
+    """
+    _check_matrix(name, matrix, shape)
+    diagonal = np.diag(matrix)
+    if np.all(diagonal > 0) and _lowest_eigenvalue(_scaled(matrix, diagonal)) > len(matrix) * np.finfo(float).eps:
+        return
+    lowest = _lowest_eigenvalue(matrix)
+    said = f"{name} is not positive definite: its smallest eigenvalue is {lowest:.6g}; every input needs a weight"
+    raise WeightsRefused(name, lowest, said)
+
+
+def check_semidefinite(
+    matrix: FloatArray, shape: tuple[int, int], name: WeightName = "Q", tolerance: float = NEGATIVE
+) -> None:
+    """Refuse a weight of states or outputs of another shape, or not positive semidefinite up to rounding.
+
+    Raises
+    ------
+    WeightsRefused : names the matrix and its eigenvalue
+    """
+    _check_matrix(name, matrix, shape)
+    _refuse_negative(name, name, matrix, matrix, tolerance)
 
 
 def _check_matrix(name: WeightName, matrix: FloatArray, shape: tuple[int, int]) -> None:
@@ -140,30 +184,18 @@ def _check_matrix(name: WeightName, matrix: FloatArray, shape: tuple[int, int]) 
         raise WeightsRefused(name, None, f"{name} holds an entry that is not finite")
     if name == "N":
         return
-    skew = np.max(np.abs(matrix - matrix.T))
-    if skew > ASYMMETRY * np.max(np.abs(matrix)):
+    skew = np.max(np.abs(matrix - matrix.T), initial=0.0)
+    if skew > ASYMMETRY * np.max(np.abs(matrix), initial=0.0):
         raise WeightsRefused(name, None, f"{name} is not symmetric: entries differ by {skew:.6g}")
 
 
-def _check_definite(R: FloatArray) -> None:
-    """R > 0, with the margin that its inverse needs."""
-    diagonal = np.diag(R)
-    if np.all(diagonal > 0) and _lowest_eigenvalue(_scaled(R, diagonal)) > len(R) * np.finfo(float).eps:
-        return
-    lowest = _lowest_eigenvalue(R)
-    raise WeightsRefused(
-        "R", lowest, f"R is not positive definite: its smallest eigenvalue is {lowest:.6g}; every input needs a weight"
-    )
-
-
-def _check_semidefinite(name: WeightName, matrix: FloatArray, Q: FloatArray, tolerance: float) -> None:
-    """``matrix >= 0`` up to rounding in the size of Q's diagonal."""
+def _refuse_negative(name: WeightName, text: str, matrix: FloatArray, Q: FloatArray, tolerance: float) -> None:
+    """Unless ``matrix >= 0`` up to rounding in the size of Q's diagonal."""
     # The larger of the two: what a cross term takes from a state without a weight counts in full.
     diagonal = np.maximum(np.abs(np.diag(Q)), np.abs(np.diag(matrix)))
     scaled = _scaled(matrix, np.where(diagonal > 0, diagonal, 1.0))
-    if _lowest_eigenvalue(scaled) >= -tolerance:
+    if not len(matrix) or _lowest_eigenvalue(scaled) >= -tolerance:
         return
-    text = "Q" if name == "Q" else "Q - N R^-1 N'"
     lowest = _lowest_eigenvalue(matrix)
     raise WeightsRefused(name, lowest, f"{text} is not positive semidefinite: its smallest eigenvalue is {lowest:.6g}")
 

@@ -104,6 +104,17 @@ def control_margins(loop: Loop) -> FloatArray:
     return np.array(found)
 
 
+def control_return_difference(loop: Loop) -> FloatArray:
+    """Smallest singular value of ``I + L`` at each point and frequency, `ct.frequency_response` and an SVD each."""
+    found = []
+    for A, B, K in zip(loop.A, loop.B, loop.K, strict=True):
+        response = ct.frequency_response(ct.ss(A, B, K, np.zeros((2, 2))), FREQUENCIES).frdata
+        found.append(
+            [np.linalg.svd(np.eye(2) + response[:, :, k], compute_uv=False)[-1] for k in range(FREQUENCIES.size)]
+        )
+    return np.array(found)
+
+
 def control_all_margins(loop: Loop) -> FloatArray:
     """Phase margin, distance from -1 and disk margin of both cuts at each point.
 

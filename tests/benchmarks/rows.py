@@ -21,6 +21,7 @@ from design.frequency.margins import margins
 from design.lqr.riccati import solve_riccati
 from design.lqr.synthesis import design_lqr
 from design.response.step_response import step_response
+from design.robustness.return_difference import smallest_return_difference
 from model.examples import wind_tunnel
 from model.flight import flight_condition
 from model.linearise import linearise
@@ -38,7 +39,9 @@ def rows() -> list[Row]:
         _linear_models(),
         _linearise_lqr(c),
         _lqr_scipy(c),
+        _lqr_scipy_many(c),
         _lqr_control(c),
+        _return_difference(c),
         _loci(c),
         _margins(c, 1),
         _margins(c, 80),
@@ -90,6 +93,29 @@ def _lqr_scipy(c: Case) -> Row:
     return Row(
         "LQR, 5 states", "scipy loop", 12.0, lambda: _solve(c), lambda: peers.scipy_lqr(c.tracking, c.weights),
         _close(1e-8),
+    )  # fmt: skip
+
+
+def _lqr_scipy_many(c: Case) -> Row:
+    """A thousand points: the 25 of the case forty times; the peer's time is taken of one of them and multiplied."""
+    copies = 40
+    A, B = (np.tile(matrix, (copies, 1, 1)) for matrix in (c.tracking.A, c.tracking.B))
+
+    def agree(ours: Any, theirs: Any) -> None:
+        _close(1e-8)(ours[: len(theirs)], theirs)
+
+    return Row(
+        "LQR, 5 states, 1000 points", "scipy loop", 20.0, lambda: solve_riccati(A, B, c.weights.Q, c.weights.R).K,
+        lambda: peers.scipy_lqr(c.tracking, c.weights), agree, copies,
+    )  # fmt: skip
+
+
+def _return_difference(c: Case) -> Row:
+    """Smallest singular value of the return difference of both inputs, over 400 frequencies."""
+    return Row(
+        "sigma_min(I + L), 400 frequencies", "control + numpy svd", 80.0,
+        lambda: smallest_return_difference(c.loop.A, c.loop.B, c.loop.K, peers.FREQUENCIES),
+        lambda: peers.control_return_difference(c.loop), _close(1e-8),
     )  # fmt: skip
 
 

@@ -118,3 +118,40 @@ def unreached_modes(points: int, seed: int) -> Problems:
         C = random.normal(size=(5, 5))
         A[i], B[i], Q[i] = T @ block @ T.T, T @ inputs, C @ C.T
     return Problems(A, B, Q, np.tile(np.eye(2), (points, 1, 1)))
+
+
+def hidden_discrete_modes(points: int, seed: int) -> Problems:
+    """The same from sample to sample: a mode at 1, -1 or elsewhere on the unit circle that Q sees ever less."""
+    random = np.random.default_rng(seed)
+    A, B, Q = np.zeros((points, 5, 5)), np.zeros((points, 5, 2)), np.zeros((points, 5, 5))
+    for i in range(points):
+        block = np.zeros((5, 5))
+        if i % 3 == 2:
+            angle = random.uniform(0.01, 3.1)
+            block[:2, :2] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+        else:
+            block[0, 0] = 1.0 - 2.0 * (i % 3)
+        modes = 2 if i % 3 == 2 else 1
+        block[modes:, modes:] = 0.6 * random.normal(size=(5 - modes, 5 - modes))
+        C = random.normal(size=(3, 5))
+        C[:, :modes] *= 10.0 ** random.uniform(-17, -3)
+        T = np.linalg.qr(random.normal(size=(5, 5)))[0] if random.random() < 0.7 else np.eye(5)
+        A[i], B[i], seen = T @ block @ T.T, T @ random.normal(size=(5, 2)), C @ T.T
+        Q[i] = seen.T @ seen
+    return Problems(A, B, 0.5 * (Q + Q.mT), np.tile(np.eye(2), (points, 1, 1)))
+
+
+def unreached_discrete_modes(points: int, seed: int) -> Problems:
+    """The same from sample to sample: an unstable mode that the inputs reach ever less."""
+    random = np.random.default_rng(seed)
+    A, B, Q = np.zeros((points, 5, 5)), np.zeros((points, 5, 2)), np.zeros((points, 5, 5))
+    for i in range(points):
+        block = np.zeros((5, 5))
+        block[0, 0] = 1.0 + abs(random.normal())
+        block[1:, 1:] = 0.6 * random.normal(size=(4, 4))
+        inputs = random.normal(size=(5, 2))
+        inputs[0] *= 10.0 ** random.uniform(-17, -1)
+        T = np.linalg.qr(random.normal(size=(5, 5)))[0] if random.random() < 0.7 else np.eye(5)
+        C = random.normal(size=(5, 5))
+        A[i], B[i], Q[i] = T @ block @ T.T, T @ inputs, C @ C.T
+    return Problems(A, B, Q, np.tile(np.eye(2), (points, 1, 1)))

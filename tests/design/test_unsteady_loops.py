@@ -64,10 +64,15 @@ def test_bryson_does_not_weigh_the_lags():
     np.testing.assert_array_equal(weights.Q[:, 5:], 0.0)
 
 
-def test_explicit_weights_are_over_all_seven_states(unsteady_a):
-    small = LqrController("lqr", ExplicitWeights(np.eye(5), np.eye(2)))
-    with pytest.raises(WeightsRefused, match=r"expected \(7, 7\), over the states .* int_a lag_1 lag_2"):
-        design_lqr(unsteady_a.model, small)
+def test_explicit_weights_are_over_all_seven_states_or_leave_the_lags_out(unsteady_a):
+    with pytest.raises(WeightsRefused, match=r"expected .*\(7, 7\).*"):
+        design_lqr(unsteady_a.model, LqrController("lqr", ExplicitWeights(np.eye(6), np.eye(2))))
+    few = np.diag([1.0, 1e-4, 10.0, 1e-3, 1e4])
+    small = design_lqr(unsteady_a.model, LqrController("lqr", ExplicitWeights(few, np.eye(2))))
+    padded = design_lqr(
+        unsteady_a.model, LqrController("lqr", ExplicitWeights(np.diag([*np.diag(few), 0.0, 0.0]), np.eye(2)))
+    )
+    np.testing.assert_allclose(small.K, padded.K, rtol=1e-12)
     Q = np.diag([1.0, 1e-4, 10.0, 1e-3, 1e4, 0.5, 0.5])
     design = design_lqr(unsteady_a.model, LqrController("lqr", ExplicitWeights(Q, np.diag([4.0, 0.25]))))
     assert design.outcomes.ok.all()

@@ -1,9 +1,11 @@
-"""Linear-quadratic regulators with published gains or a solution in closed form."""
+"""Linear-quadratic regulators with published gains, in continuous and in discrete time."""
 
 import numpy as np
 import pytest
 
+from design.lqr.discrete_riccati import solve_discrete_riccati
 from design.lqr.riccati import solve_riccati
+from design.lqr.sampled_cost import sampled_regulator
 
 # Every matrix below is A, B, Q, R; expected numbers to half a unit of their last printed digit.
 
@@ -69,42 +71,102 @@ def test_altair_second_order():
     assert solution.largest_real_part == pytest.approx(-0.63246, abs=5e-6)
 
 
-# Benner, Laub, Mehrmann, "A collection of benchmark examples for the numerical solution of algebraic Riccati
-# equations I: continuous-time case", TU Chemnitz-Zwickau, SPC 95-22 (1995): examples 1, 2, 7, 9 and 10.
+def test_mathworks_care():
+    """MathWorks, Control System Toolbox reference page of `care`; R package `control` 0.2.5, with more digits."""
+    solution = solve([[-3, 2], [1, 1]], [[0], [1]], [[1, -1], [-1, 1]], 3.0)
+    np.testing.assert_allclose(solution.K, [[0.6071916, 2.939613]], atol=5.1e-7)
+    np.testing.assert_allclose(solution.X, [[0.5895174, 1.8215747], [1.8215747, 8.818840]], atol=5.1e-7)
+    assert solution.largest_real_part == pytest.approx(-1.436984, abs=5e-7)
 
 
-def test_carex_1():
-    solution = solve([[0, 1], [0, 0]], [[0], [1]], np.diag([1, 2]))
-    np.testing.assert_allclose(solution.X, [[2, 1], [1, 2]], rtol=1e-13)
+def test_altair_care():
+    """Altair Compose reference guide, `care`."""
+    C = np.array([[5, -0.5]])
+    solution = solve([[-15, 1], [0.5, 5]], [[0], [5]], C.T @ C, 1.5)
+    np.testing.assert_allclose(solution.K, [[-0.22552, 2.03752]], atol=5e-6)
+    np.testing.assert_allclose(solution.X, [[0.82854, -0.06766], [-0.06766, 0.61126]], atol=5e-6)
+    assert solution.largest_real_part == pytest.approx(-5.02446, abs=5e-6)
 
 
-def test_carex_2_has_a_singular_solution():
-    """One mode is stable and unobserved: X is singular, and right."""
-    solution = solve([[4, 3], [-4.5, -3.5]], [[1], [-1]], [[9, 6], [6, 4]])
-    np.testing.assert_allclose(solution.X, (1 + np.sqrt(2)) * np.array([[9, 6], [6, 4]]), rtol=1e-12)
-    assert solution.largest_real_part == pytest.approx(-0.5, rel=1e-12)
+def pendulum():
+    """Inverted pendulum on a cart of the Control Tutorials for MATLAB and Simulink (University of Michigan)."""
+    M, m, b, inertia, g, length = 0.5, 0.2, 0.1, 0.006, 9.8, 0.3
+    p = inertia * (M + m) + M * m * length**2
+    A = np.zeros((4, 4))
+    A[0, 1] = A[2, 3] = 1.0
+    A[1, 1:3] = -(inertia + m * length**2) * b / p, m**2 * g * length**2 / p
+    A[3, 1:3] = -m * length * b / p, m * g * length * (M + m) / p
+    return A, np.array([[0.0], [(inertia + m * length**2) / p], [0.0], [m * length / p]])
 
 
-@pytest.mark.parametrize("eps", [1.0, 1e-3, 1e-6])
-def test_carex_7_an_unstable_mode_hardly_reached(eps):
-    solution = solve(np.diag([1, -2]), [[eps], [0]], np.ones((2, 2)))
-    root = np.sqrt(1 + eps**2)
-    x11, x12 = (1 + root) / eps**2, 1 / (2 + root)
-    x22 = 0.25 * (1 - eps**2 * x12**2)
-    np.testing.assert_allclose(solution.X, [[x11, x12], [x12, x22]], rtol=1e-9)
+@pytest.mark.parametrize(
+    ("weights", "K"),
+    [
+        ((1, 1), [[-1.0000, -1.6567, 18.6854, 3.4594]]),
+        ((5000, 100), [[-70.7107, -37.8345, 105.5298, 20.9238]]),
+    ],
+)
+def test_pendulum(weights, K):
+    """Control Tutorials for MATLAB and Simulink, "Inverted Pendulum: State-Space Methods for Controller Design"."""
+    solution = solve(*pendulum(), np.diag([weights[0], 0, weights[1], 0]))
+    np.testing.assert_allclose(solution.K, K, atol=5.1e-5)
 
 
-@pytest.mark.parametrize("eps", [1e-6, 1e-2, 1.0, 1e2, 1e6])
-def test_carex_9_states_decades_apart(eps):
-    solution = solve([[0, eps], [0, 0]], [[0], [1]], np.eye(2))
-    root = np.sqrt(1 + 2 * eps)
-    np.testing.assert_allclose(solution.X, [[root / eps, 1], [1, root]], rtol=1e-10)
+# In discrete time.
 
 
-@pytest.mark.parametrize("eps", [1.0, 1e-3, 1e-5])
-def test_carex_10_poles_of_the_hamiltonian_near_the_axis(eps):
-    e = eps + 1
-    solution = solve([[e, 1], [1, e]], np.eye(2), eps**2 * np.eye(2), np.eye(2))
-    x11 = 0.5 * (2 * e + np.sqrt(2 * e**2 + 2) + np.sqrt(2) * eps)
-    x12 = x11 / (x11 - e)
-    np.testing.assert_allclose(solution.X, [[x11, x12], [x12, x11]], rtol=1e-9)
+def solve_discrete(A, B, Q, R=1.0):
+    matrices = (np.atleast_2d(np.asarray(m, dtype=float)) for m in (A, B, Q, R))
+    solution = solve_discrete_riccati(*matrices)
+    assert solution.certified
+    return solution
+
+
+@pytest.mark.parametrize(
+    ("weights", "K"),
+    [
+        ((1, 1), [[-0.9384, -1.5656, 18.0351, 3.3368]]),
+        ((5000, 100), [[-61.9933, -33.5040, 95.0597, 18.8300]]),
+    ],
+)
+def test_sampled_pendulum(weights, K):
+    """Control Tutorials for MATLAB and Simulink, "Inverted Pendulum: Digital Controller Design", 100 Hz."""
+    A, B = pendulum()
+    s = sampled_regulator(A, B, np.eye(4), np.eye(1), None, 0.01)
+    solution = solve_discrete(s.A, s.B, np.diag([weights[0], 0, weights[1], 0]))
+    np.testing.assert_allclose(solution.K, K, atol=5.1e-5)
+
+
+def test_mathworks_idare():
+    """MathWorks, Control System Toolbox reference pages of `dare` and `idare`."""
+    solution = solve_discrete([[-0.9, -0.3], [0.7, 0.1]], [[1], [1]], np.diag([1, 3]), 0.1)
+    np.testing.assert_allclose(solution.K, [[-0.2216, -0.1297]], atol=5e-5)
+    np.testing.assert_allclose(solution.X, [[4.7687, 0.9438], [0.9438, 3.2369]], atol=5e-5)
+    assert solution.spectral_radius == pytest.approx(0.4460, abs=5e-5)
+
+
+def test_octave_dare():
+    """GNU Octave, control package, the example of `dare` in its test suite."""
+    C = np.array([[1, -1]])
+    solution = solve_discrete([[0.4, 1.7], [0.9, 3.8]], [[0.8], [2.1]], C.T @ C, 3.0)
+    np.testing.assert_allclose(solution.K, [[0.4092, 1.7283]], atol=5e-5)
+    np.testing.assert_allclose(solution.X, [[1.5354, 1.2623], [1.2623, 10.5596]], atol=5e-5)
+    assert solution.spectral_radius == pytest.approx(0.2454, abs=5e-5)
+
+
+def test_altair_dare():
+    """Altair Compose reference guide, `dare`."""
+    C = np.array([[10, -1]])
+    solution = solve_discrete([[4.0, 1.7], [0.9, 38]], [[8], [21]], C.T @ C, 3.0)
+    np.testing.assert_allclose(solution.K, [[-0.01271, 2.00364]], atol=5e-6)
+    X = [[1704.70115, -5616.08147], [-5616.08147, 19597.56409]]
+    np.testing.assert_allclose(solution.X, X, atol=5.1e-6)
+    assert solution.spectral_radius == pytest.approx(0.02222, abs=5e-6)
+
+
+def test_altair_dlqr():
+    """Altair Compose reference guide, `dlqr`."""
+    solution = solve_discrete([[9, 0.2], [0, 8]], [[0], [1]], [[2, 1], [1, 2]])
+    np.testing.assert_allclose(solution.K, [[394.61003, 16.76761]], atol=5.1e-6)
+    np.testing.assert_allclose(solution.X, [[1.04036e07, 2.34349e05], [2.34349e05, 5.34387e03]], rtol=5e-6)
+    assert solution.spectral_radius == pytest.approx(0.12166, abs=5e-6)

@@ -4,6 +4,8 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from design.lqr.certificate import MAX_RESIDUAL
+from design.lqr.regulator import regulator_problem
 from design.lqr.riccati import solve_riccati
 from design.lqr.weights import weight_matrices
 from tests.design.exact_riccati import exact_solution
@@ -145,6 +147,24 @@ def test_weights_over_twelve_decades_are_never_certified_and_wrong():
     problems = weights_over_twelve_decades(200, seed=5)
     # Not one is refused either, though scipy alone has residuals above 1e-10 at several of them.
     assert judge(problems, gain_tolerance=1e-9, damping_tolerance=1e-5) == 200
+
+
+def test_the_hard_set_leaves_fewer_points_than_scipy():
+    """2000 points over twelve decades: uncertified ones against scipy's with a residual above the same limit."""
+    problems = weights_over_twelve_decades(2000, seed=1)
+    solution = solve_riccati(problems.A, problems.B, problems.Q, problems.R)
+    equation = regulator_problem(problems.A, problems.B, problems.Q, problems.R).equation
+    A, F, Q = equation.A, equation.F, equation.Q
+    missed = 0
+    for i in range(0, 2000, 10):
+        X = scipy.linalg.solve_continuous_are(problems.A[i], problems.B[i], problems.Q[i], problems.R[i])
+        unit = np.ldexp(1.0, equation.state_exponent[i])
+        X = X * unit[:, None] * unit
+        terms = A[i].T @ X, X @ A[i], -X @ F[i] @ F[i].T @ X, Q[i]
+        missed += np.linalg.norm(sum(terms)) > MAX_RESIDUAL * sum(np.linalg.norm(t) for t in terms)
+    assert missed >= 3
+    assert np.sum(~solution.certified) <= missed
+    assert np.max(solution.residual[solution.certified]) <= MAX_RESIDUAL
 
 
 def test_modes_hidden_from_the_cost_are_never_certified_and_wrong():

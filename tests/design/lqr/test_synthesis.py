@@ -49,6 +49,8 @@ def test_examples(name):
         assert design.largest_real_part[index] == pytest.approx(poles.real.max(), rel=1e-9)
         assert poles.real.max() < 0
     np.testing.assert_array_equal(design.N, feed_forward(design.K, steady_state(model)))
+    assert design.states == plant.states
+    assert design.retuning is None
     assert_only_ok_points_carry_numbers(design)
 
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -25,12 +27,36 @@ def test_brysons_rule_over_the_named_states_and_inputs():
     assert weights.N is None
 
 
+def test_brysons_rule_over_other_states():
+    both = replace(WIND_TUNNEL_WEIGHTS, tab_integral=0.004)
+    states = ("dt", "dt_rate", "da", "da_rate", "int_a", "int_t", "tab_torque", "lag_1")
+    weights = weight_matrices(both, states)
+    np.testing.assert_array_equal(weights.Q[:5, :5], weight_matrices(WIND_TUNNEL_WEIGHTS).Q)
+    assert weights.Q[5, 5] == pytest.approx(1.0 / 0.004**2)
+    np.testing.assert_array_equal(weights.Q[6:], 0.0)
+    # A regulator has no integral to weigh, and needs no value for one.
+    alone = replace(WIND_TUNNEL_WEIGHTS, aileron_integral=None)
+    np.testing.assert_array_equal(weight_matrices(alone, states[:4]).Q, weights.Q[:4, :4])
+
+
+@pytest.mark.parametrize(("name", "state"), [("aileron_integral", "int_a"), ("tab_integral", "int_t")])
+def test_brysons_rule_without_a_value_for_an_integral_that_there_is(name, state):
+    weights = replace(WIND_TUNNEL_WEIGHTS, **{"tab_integral": 0.004, name: None})
+    with pytest.raises(WeightsRefused, match=f"{name} is missing.* 0 1/s .*{state}") as refused:
+        weight_matrices(weights, ("dt", "dt_rate", "da", "da_rate", "int_a", "int_t"))
+    assert (refused.value.matrix, refused.value.eigenvalue) == ("Q", 0.0)
+
+
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_bryson_needs_positive_values(value):
     values = [1.0] * 7
     values[4] = value
     with pytest.raises(ValueError, match="aileron_integral"):
         BrysonWeights(*values)
+    with pytest.raises(ValueError, match="tab_integral"):
+        replace(WIND_TUNNEL_WEIGHTS, tab_integral=value)
+    with pytest.raises(ValueError, match="aileron_rate"):
+        replace(WIND_TUNNEL_WEIGHTS, aileron_rate=None)
 
 
 def test_bryson_values_too_small_to_square_are_refused_later():
