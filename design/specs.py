@@ -110,7 +110,8 @@ class Verdict(GridArrays):
         """
         if not np.any(self.judged):
             return None
-        part = np.where(np.isnan(self.values), -np.inf, self.distance / self.spec.scale)
+        with np.errstate(over="ignore"):
+            part = np.where(np.isnan(self.values), -np.inf, self.distance / self.spec.scale)
         return int(np.argmin(np.where(self.judged, part, np.inf)))
 
 

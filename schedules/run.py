@@ -109,6 +109,11 @@ def _flown(
 
 
 def _lqr(study: Study, plant: PlantEnvelope, request: LqrController) -> DesignedController:
+    if request.sampling is not None or request.measurement is not None:
+        raise ValueError(
+            f"controller {request.name}: over a grid, state feedback is designed in continuous time with all states "
+            "measured; see design.lqr.sampled_design and design.estimation"
+        )
     try:
         found = design_lqr(plant.model, request, plant.outcomes, study.tab_actuator, study.aileron_actuator)
     except WeightsRefused as refused:

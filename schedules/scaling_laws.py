@@ -131,6 +131,9 @@ def _flown(
 
 def _matrix(symbol: str, rows: Sequence[str], columns: Sequence[str], values: dict[str, FloatArray]) -> FloatArray:
     """Matrix (*G, m, n) of the gains ``<symbol>_<row>_<column>``."""
+    if not columns:  # a regulator has no feed-forward
+        (some, *_) = values.values()
+        return np.zeros((*some.shape, len(rows), 0))
     return np.stack([np.stack([values[f"{symbol}_{u}_{x}"] for x in columns], axis=-1) for u in rows], axis=-2)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from service.design_examples import design_requests
 from service.examples import NAMES, example
 
 Examples = dict[str, dict[str, Any]]
@@ -46,72 +47,7 @@ def plant() -> dict[str, Any]:
 
 
 def _designs() -> Examples:
-    shipped = {name: _shown(name, example(name)) for name in NAMES}
-    return shipped | {
-        "four_classical_controllers": _shown("four classical controllers", _four_classical_controllers()),
-        "given_gains": _shown("gains that are given, all of them or some", _given_gains()),
-        "specs_over_the_grid": _shown(
-            "specs that vary over the grid, and a spec pack of one's own", _specs_that_vary()
-        ),
-    }
-
-
-def _four_classical_controllers() -> dict[str, Any]:
-    """Both structures, with both commands of the tab's actuator (seed 4.1, 4.2)."""
-    negative = {
-        "kind": "negative_feedback",
-        "specs": {"damping_ratio_min": 0.5, "gain_margin_db_min": 6.0, "phase_margin_deg_min": 45.0},
-        "rate_filter_hz": 100.0,
-    }
-    positive = {"kind": "positive_feedback", "specs": {"damping_ratio_min": 0.4}}
-    controllers = [
-        {"name": f"{name}_{command}", "tab_command": command, **law}
-        for name, law in (("negative", negative), ("positive", positive))
-        for command in ("deflection", "rate")
-    ]
-    return _wind_tunnel("four_classical_controllers", controllers) | {
-        "grid": {"altitude_m": [0.0], "dynamic_pressure_pa": [245.0, 551.25, 980.0, 1531.25]}
-    }
-
-
-def _given_gains() -> dict[str, Any]:
-    """Gains that are judged as they are; of the last controller, one that is completed."""
-    gains = {
-        "K_d": {"axis": "dynamic_pressure_pa", "values": [0.053, 0.025, 0.015, 0.0098]},
-        "K_p": {"values": [[1.61, 0.82, 0.52, 0.37], [1.5, 0.74, 0.46, 0.32]]},
-        "K_i": 44.0,
-    }
-    given = {"kind": "negative_feedback", "rate_filter_hz": 100.0, "gains": gains}
-    digital = {"sample_time_s": 0.001, "computational_delay_s": 0.0005}
-    some = {"kind": "positive_feedback", "gains": {"K_f": 0.5}, "specs": {"overshoot_percent_max": 5.0}}
-    return _wind_tunnel(
-        "given_gains", [{"name": "given"} | given, {"name": "digital"} | given | digital, {"name": "some"} | some]
-    )
-
-
-def _specs_that_vary() -> dict[str, Any]:
-    """Damping by dynamic pressure, settling time by altitude and dynamic pressure; gains may vary smoothly."""
-    specs = {
-        "damping_ratio_min": {"axis": "dynamic_pressure_pa", "values": [0.6, 0.55, 0.5, 0.45]},
-        "settling_time_s_max": {"values": [[0.4, 0.35, 0.3, 0.2], [0.5, 0.45, 0.4, 0.3]]},
-        "gain_margin_db_min": 6.0,
-        "phase_margin_deg_min": 45.0,
-        "overshoot_percent_max": 10.0,
-    }
-    controller = {
-        "name": "nf",
-        "kind": "negative_feedback",
-        "rate_filter_hz": 100.0,
-        "specs": specs,
-        "smoothing": {"bandwidth_loss_percent_max": 10.0},
-    }
-    tab_rates = {"axis": "altitude_m", "values": [400.0, 300.0]}
-    pack = {"name": "ours", "specs": {"disk_margin_min": 0.6, "tab_rate_deg_s_max": tab_rates}}
-    return _wind_tunnel("specs_over_the_grid", [controller]) | {"spec_pack": pack}
-
-
-def _wind_tunnel(name: str, controllers: list[dict[str, Any]]) -> dict[str, Any]:
-    return example(NAMES[0]) | {"name": name, "controllers": controllers}
+    return {name: _shown(summary, value) for name, (summary, value) in design_requests().items()}
 
 
 def _hinge_moments() -> Examples:

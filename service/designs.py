@@ -11,8 +11,10 @@ from typing import TypeVar
 import numpy as np
 import orjson
 
+from design.lqr.output_weights import OutputWeights
+from design.lqr.power_weights import NetWorkWeights, PowerBalancedWeights, Weights
 from design.lqr.synthesis import LqrController
-from design.lqr.weights import ExplicitWeights
+from design.lqr.weights import ExplicitWeights, WeightName
 from model.arrays import FloatArray
 from schedules.analysis import PlantEnvelope, analyse
 from schedules.designed import ControllerRefused, DesignedController, DesignedEnvelope
@@ -33,10 +35,18 @@ from service.version import code_version
 #: Largest relative change of a gain between a stored design and the same design made again.
 SAME_GAINS = 1e-9
 
-#: What weights must be to define a regulator.
+#: What weights must be to define a regulator: of states and inputs, of outputs, with a price of work on top.
 WORKING_WEIGHTS = (
     "R symmetric positive definite; Q and Q - N R^-1 N' symmetric positive semidefinite, and Q sees every mode "
     "that does not decay by itself"
+)
+WORKING_OUTPUT_WEIGHTS = (
+    "W_u symmetric positive definite; W_y symmetric positive semidefinite, and the outputs show every mode that does "
+    "not decay by itself"
+)
+WORKING_PRICES = (
+    "prices of work so small that the whole cost stays positive semidefinite, of actuators whose rate has a weight "
+    "in the base"
 )
 
 StudyKind = TypeVar("StudyKind", bound=PlantStudy)
@@ -138,10 +148,23 @@ def _weights_refusal(study: PlantStudy, error: ControllerRefused) -> InvalidRequ
     controllers = study.controllers if isinstance(study, Study) else ()
     place = [wanted.name for wanted in controllers].index(error.controller)
     wanted, refused = controllers[place], error.refused
-    explicit = isinstance(wanted, LqrController) and isinstance(wanted.weights, ExplicitWeights)
-    pointer = f"/controllers/{place}/weights" + (f"/{refused.matrix}" if explicit else "")
-    field = FieldRefusal(pointer, f"{refused.matrix}: {refused.reason}", "SI", WORKING_WEIGHTS)
-    return InvalidRequest(f"{pointer}: {field.detail}", field)
+    field, allowed = _at_fault(wanted.weights, refused.matrix) if isinstance(wanted, LqrController) else ("", "")
+    pointer = f"/controllers/{place}/weights{field}"
+    refusal = FieldRefusal(pointer, f"{refused.matrix}: {refused.reason}", "SI", allowed)
+    return InvalidRequest(f"{pointer}: {refusal.detail}", refusal)
+
+
+def _at_fault(weights: Weights, matrix: WeightName) -> tuple[str, str]:
+    """Pointer below the weights to the field that a matrix of the cost comes from, and what it must be."""
+    if isinstance(weights, NetWorkWeights) and matrix == "N":
+        # The cross term is of the price and of the base together, and the refusal does not tell them apart.
+        return "", f"{WORKING_PRICES}; of the base: {WORKING_WEIGHTS}"
+    if isinstance(weights, NetWorkWeights | PowerBalancedWeights):
+        field, allowed = _at_fault(weights.base, matrix)
+        return f"/base{field}", allowed
+    if isinstance(weights, OutputWeights):
+        return "/W_u" if matrix in ("R", "W_u") else "/W_y", WORKING_OUTPUT_WEIGHTS
+    return f"/{matrix}" if isinstance(weights, ExplicitWeights) else "", WORKING_WEIGHTS
 
 
 def _stored(ident: str, request: DesignRequest, envelope: DesignedEnvelope) -> StoredDesign:

@@ -23,7 +23,7 @@ class Settings(BaseSettings):
     max_tab_only_designs: int = Field(
         default=500,
         ge=1,
-        description="Grid points times tab-only controllers of a design whose gains are chosen; 1 ms to 0.3 s each",
+        description="Searches of a design: grid points times controllers whose gains or powers are sought",
     )
     max_locus_gains: int = Field(default=2000, ge=2, description="Gains of a root locus")
     max_response_samples: int = Field(default=5000, ge=2, description="Samples of a response")

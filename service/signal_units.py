@@ -14,7 +14,10 @@ _INSIDE = {
     "dt_rate_command": "rad/s",
     "T_t": "N m",
     "T_a": "N m",
+    "T_t_command": "N m",
+    "T_a_command": "N m",
     "r_a": "rad",
+    "r_t": "rad",
 }
 #: Unit inside -> unit on the wire, and how many of it make one inside.
 _ON_THE_WIRE = {"rad": ("deg", degrees(1.0)), "rad/s": ("deg/s", degrees(1.0)), "N m": ("N m", 1.0)}

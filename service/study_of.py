@@ -9,7 +9,6 @@ import numpy as np
 
 from design.classical.controller import ClassicalController
 from design.lqr.synthesis import LqrController
-from design.lqr.weights import BrysonWeights, ExplicitWeights
 from design.sampling import Sampling
 from design.specs import SPEC_PACKS, Spec
 from model.actuators import Actuator, ActuatorLimits
@@ -20,8 +19,10 @@ from model.hinge_moments.expansion import Angles
 from model.section import Body, Geometry, Inertia
 from model.trim_request import LARGEST_TRIM_ANGLE, HeldTorque, TrimRequest
 from schedules.study import Controller, GridRequest, PlantStudy, Reference, Study
-from service.schemas import actuators, aerodynamics, controller_requests, flight, requests, section, weights
+from service import lqr_of
+from service.schemas import actuators, aerodynamics, controller_requests, flight, lqr_requests, requests, section
 from service.schemas import trim as trims
+from service.schemas.any_controller import AnyController
 from service.schemas.given_gains import Gains
 from service.schemas.grid_values import GridAxes, OverGrid
 from service.schemas.specs import SpecPack, Specs
@@ -47,8 +48,8 @@ def study(request: requests.DesignRequest) -> Study:
         grid=grid(request.grid, request.atmosphere),
         tab_actuator=tab_actuator(request.actuators.tab),
         aileron_actuator=aileron_actuator(request.actuators.aileron),
-        reference=Reference(radians(request.reference.aileron_deg), request.reference.duration_s),
-        controllers=tuple(controller(wanted, axes) for wanted in request.controllers),
+        reference=reference(request.reference),
+        controllers=tuple(controller(wanted, axes, request.reference) for wanted in request.controllers),
         spec_pack=spec_pack(request.spec_pack, axes),
     )
 
@@ -174,10 +175,23 @@ def limits(wire: actuators.Limits) -> ActuatorLimits:
     )
 
 
-def controller(wire: controller_requests.Controller, axes: GridAxes) -> Controller:
-    """A controller by its kind."""
-    if isinstance(wire, controller_requests.Lqr):
-        return LqrController(wire.name, lqr_weights(wire.weights), wire.tab_allocation)
+def reference(wire: flight.Reference) -> Reference:
+    """The manoeuvre that actuators are judged on."""
+    return Reference(aileron=radians(wire.aileron_deg), duration=wire.duration_s, tab=radians(wire.tab_deg))
+
+
+def controller(wire: controller_requests.Controller, axes: GridAxes, step: flight.Reference) -> Controller:
+    """A controller by its kind; `step` is the manoeuvre that its power is weighed on."""
+    if isinstance(wire, lqr_requests.Lqr):
+        return LqrController(
+            name=wire.name,
+            weights=lqr_of.lqr_weights(wire.weights, lqr_of.reference_step(step, wire)),
+            tab_allocation=lqr_of.tab_allocation(wire.tab_allocation),
+            reference=wire.reference,
+            delay_states=wire.delay_states,
+            sampling=sampling(wire),
+            measurement=lqr_of.measurement(wire.measurement),
+        )
     return ClassicalController(
         name=wire.name,
         kind=wire.kind,
@@ -205,7 +219,7 @@ def gains(wire: Gains, axes: GridAxes) -> dict[str, Floats]:
     return {name: over_grid(gain, axes) for name, gain in wire if gain is not None}
 
 
-def sampling(wire: controller_requests.Classical) -> Sampling | None:
+def sampling(wire: AnyController) -> Sampling | None:
     """How a digital controller runs; None for a continuous one."""
     if wire.sample_time_s is None or wire.computational_delay_s is None:
         return None
@@ -219,25 +233,6 @@ def over_grid(wire: float | OverGrid, axes: GridAxes) -> Floats:
     values = np.array(wire.values, dtype=float)
     along_first = wire.axis == axes.names[0]
     return np.ascontiguousarray(np.broadcast_to(values[:, None] if along_first else values, axes.counts))
-
-
-def lqr_weights(wire: controller_requests.Weights) -> BrysonWeights | ExplicitWeights:
-    """Weights by their rule; Bryson's angles from degrees to radians."""
-    if isinstance(wire, weights.BrysonWeights):
-        return BrysonWeights(
-            aileron=radians(wire.aileron_deg),
-            aileron_rate=radians(wire.aileron_rate_deg_s),
-            tab=radians(wire.tab_deg),
-            tab_rate=radians(wire.tab_rate_deg_s),
-            aileron_integral=radians(wire.aileron_integral_deg_s),
-            tab_torque=wire.tab_torque_n_m,
-            aileron_torque=wire.aileron_torque_n_m,
-        )
-    return ExplicitWeights(
-        Q=np.array(wire.Q, dtype=float),
-        R=np.array(wire.R, dtype=float),
-        N=None if wire.N is None else np.array(wire.N, dtype=float),
-    )
 
 
 def _rad_s(frequency_hz: float | None) -> float | None:

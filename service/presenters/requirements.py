@@ -54,7 +54,8 @@ def requirements_document(envelope: DesignedEnvelope, controller: DesignedContro
 def reference_document(reference: Reference, duration: float) -> dict[str, Any]:
     """The manoeuvre that is followed, for how long."""
     aileron = float(np.rad2deg(reference.aileron))
-    return {"reference": {"kind": reference.kind, "aileron_deg": aileron, "duration_s": duration}}
+    tab = float(np.rad2deg(reference.tab))
+    return {"reference": {"kind": reference.kind, "aileron_deg": aileron, "tab_deg": tab, "duration_s": duration}}
 
 
 def _over_grid(demand: ActuatorDemand | None, shape: tuple[int, ...]) -> dict[str, FloatArray]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import numpy as np
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
@@ -80,7 +79,8 @@ def response(
     index = point_with_gains(envelope, controller, wanted.point)
     reference = envelope.study.reference
     duration = wanted.duration_s or reference.duration
-    found = delayed_step_response(controller.loop.take(index), np.array([reference.aileron]), duration, wanted.samples)
+    loop = controller.loop.take(index)
+    found = delayed_step_response(loop, reference.sizes(loop.references), duration, wanted.samples)
     document = {"name": name, "point": wanted.point, "kind": wanted.kind}
     return answer(request, encode(document | reference_document(reference, duration) | response_document(found)))
 

@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from service.schemas.wire import Request, refusal
 
 Bandwidth = Annotated[float, Field(ge=1e-3, le=1e4)]
-Ideal = Annotated[float, Field(ge=0.0, le=0.0)]
+#: A delay below this is none [s]: far below what any loop could tell, and where numbers begin to fail.
+SHORTEST_DELAY = 1e-9
+
+
+def none_below_shortest(delay: float) -> float:
+    """The delay, or zero when it is so short that it is none: both are the same request."""
+    return delay if delay >= SHORTEST_DELAY else 0.0
+
+
+Delay = Annotated[float, Field(ge=0.0, le=1.0), AfterValidator(none_below_shortest)]
+
+_TORQUE_LOOP = "Bandwidth of the torque loop, a first-order lag, for controllers that command a torque; null: ideal"
 
 
 class Limits(Request):
@@ -22,10 +33,10 @@ class Limits(Request):
 
 
 class AileronActuator(Request):
-    """The aileron's actuator, commanded by torque. This version takes its torque loop as ideal."""
+    """The aileron's actuator, commanded by torque."""
 
-    torque_loop_bandwidth_hz: None = Field(default=None, description="This version: null, an ideal torque loop")
-    delay_s: Ideal = Field(default=0.0, description="Transport delay of the command; this version: none")
+    torque_loop_bandwidth_hz: Bandwidth | None = Field(default=None, description=_TORQUE_LOOP)
+    delay_s: Delay = Field(default=0.0, description="Transport delay of the command; below 1e-9 none")
     limits: Limits = Field(default_factory=Limits)
 
 
@@ -46,11 +57,8 @@ class TabActuator(Request):
         description="Bandwidth of the rate loop, for controllers that command a tab rate; null: ideal, where K_theta "
         "is given or the actuator has a delay",
     )
-    torque_loop_bandwidth_hz: None = Field(default=None, description="This version: null, an ideal torque loop")
-    delay_s: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
-        default=0.0,
-        description="Transport delay of the command. This version designs state feedback (`lqr`) without one",
-    )
+    torque_loop_bandwidth_hz: Bandwidth | None = Field(default=None, description=_TORQUE_LOOP)
+    delay_s: Delay = Field(default=0.0, description="Transport delay of the command; below 1e-9 none")
     limits: Limits = Field(default_factory=Limits)
 
     @model_validator(mode="after")

@@ -96,6 +96,7 @@ class ReferenceStep(Answer):
 
     kind: Literal["step"]
     aileron_deg: float
+    tab_deg: float
     duration_s: float
 
 

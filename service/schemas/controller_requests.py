@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from service.schemas.actuators import Bandwidth
+from service.schemas.any_controller import AnyController
 from service.schemas.given_gains import Gains, NegativeFeedbackGains, NoneGivenIsNull, PositiveFeedbackGains
 from service.schemas.grid_values import GridAxes, fields_on_grid
+from service.schemas.lqr_requests import Lqr
 from service.schemas.specs import Specs
-from service.schemas.weights import BrysonWeights, ExplicitWeights
 from service.schemas.wire import Request, refusal
-
-ControllerName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,62}$")]
-Weights = Annotated[BrysonWeights | ExplicitWeights, Field(discriminator="rule")]
-
-#: Longest computational delay, in samples.
-MOST_DELAY = 10.0
 
 
 class Smoothing(Request):
@@ -33,13 +28,12 @@ def null_when_nothing_is_given_up(smoothing: Smoothing | None) -> Smoothing | No
     return smoothing if smoothing is not None and smoothing.bandwidth_loss_percent_max > 0.0 else None
 
 
-class Classical(Request):
+class Classical(AnyController):
     """What the two classical controllers share: the tab alone is moved, by deflections or by rates."""
 
     #: Names of the gains around the tab loop, in the order in which the loops are closed.
     outer_gains: ClassVar[tuple[str, ...]]
 
-    name: ControllerName
     tab_command: Literal["deflection", "rate"] = Field(
         default="deflection",
         description="What the tab's actuator is given: a deflection, or a rate by an inner loop on the tab's angle "
@@ -52,30 +46,6 @@ class Classical(Request):
     smoothing: Annotated[Smoothing | None, AfterValidator(null_when_nothing_is_given_up)] = Field(
         default=None, description="null: every point has its fastest design"
     )
-    sample_time_s: Annotated[float, Field(ge=1e-5, le=1.0)] | None = Field(
-        default=None, description="Sample time of a digital controller; null: a continuous one"
-    )
-    computational_delay_s: Annotated[float, Field(ge=0.0, le=MOST_DELAY)] | None = Field(
-        default=None,
-        validate_default=True,
-        description="Time from a measurement to the command that is computed from it, at most ten samples; null: one "
-        "sample",
-    )
-
-    @field_validator("computational_delay_s")
-    @classmethod
-    def delay_of_samples(cls, delay: float | None, info: ValidationInfo) -> float | None:
-        """One sample unless it is given; refused without a sample time, or over too many samples."""
-        sample = info.data.get("sample_time_s")
-        if delay is None:
-            return sample if isinstance(sample, float) else None
-        if "sample_time_s" in info.data and sample is None:
-            raise refusal("a continuous controller has no computational delay", "null, or sample_time_s beside it")
-        if sample is not None and delay > MOST_DELAY * sample * (1.0 + 1e-9):
-            raise refusal(
-                f"longer than {MOST_DELAY:g} samples of {sample:g} s", f">= 0 and <= {MOST_DELAY * sample:g}, or null"
-            )
-        return delay
 
     @property
     def gain_names(self) -> tuple[str, ...]:
@@ -136,19 +106,6 @@ class PositiveFeedback(Classical):
     gains: Annotated[PositiveFeedbackGains | None, NoneGivenIsNull] = Field(
         default=None, description="Gains that are given; null: all are chosen"
     )
-
-
-class Lqr(Request):
-    """Both surfaces by torque: state feedback with an integral of the aileron's error and feed-forward (seed 5.3)."""
-
-    name: ControllerName
-    kind: Literal["lqr"]
-    reference: Literal["aileron"] = "aileron"
-    weights: Weights
-    tab_allocation: Literal["zero_aileron_torque"] = Field(
-        default="zero_aileron_torque", description="Where the free tab settles: so that the aileron holds itself"
-    )
-    sample_time_s: None = Field(default=None, description="This version designs in continuous time: null")
 
 
 Controller = Annotated[NegativeFeedback | PositiveFeedback | Lqr, Field(discriminator="kind")]

@@ -141,12 +141,13 @@ class Atmosphere(Request):
 
 
 class Reference(Request):
-    """The manoeuvre actuators are judged on: a step of the aileron from trim."""
+    """The manoeuvre actuators are judged on: a step from trim of what follows a reference."""
 
     kind: Literal["step"] = "step"
-    aileron_deg: SurfaceAngle = Field(description="Size of the step; not zero", examples=[10.0])
-    tab_deg: Annotated[float, Field(ge=0.0, le=0.0)] = Field(
-        default=0.0, description="This version follows an aileron reference only"
+    aileron_deg: SurfaceAngle = Field(description="Size of the aileron's step; not zero", examples=[10.0])
+    tab_deg: SurfaceAngle = Field(
+        default=0.0,
+        description="Size of the tab's step, of controllers with the reference `aileron_and_tab`; zero without one",
     )
     rate_limit_deg_s: None = Field(default=None, description="This version follows an unlimited step only")
     duration_s: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(description="How long the response is followed")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from math import ceil
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from design.sampling import Sampling
 from service.schemas.actuators import Actuators, TabActuator
 from service.schemas.aerodynamics import Aerodynamics, ThinAerofoil
-from service.schemas.controller_requests import Classical, Controller, Lqr, NegativeFeedback, PositiveFeedback
+from service.schemas.controller_requests import Classical, Controller, NegativeFeedback, PositiveFeedback
 from service.schemas.flight import Atmosphere, Grid, Reference, SurfaceAngle
 from service.schemas.grid_values import GridAxes, fields_on_grid
+from service.schemas.lqr_requests import Lqr
 from service.schemas.section import Geometry, HingeGeometry, Inertia
 from service.schemas.specs import AnySpecPack, SpecPack
 from service.schemas.trim import Trim
@@ -70,13 +73,45 @@ def rate_loop_for(controller: Classical, tab: TabActuator) -> None:
         )
 
 
-def no_delay_of_torques(tab: TabActuator) -> None:
-    """Refuse state feedback through a tab actuator with a delay."""
-    if tab.delay_s > 0.0:
+def step_longer_than_delays(controller: Lqr, actuators: Actuators, step: Reference) -> None:
+    """Refuse a response that would end before the surfaces hear of the step."""
+    delay = max(actuators.tab.delay_s, actuators.aileron.delay_s)
+    if controller.sample_time_s is not None and controller.computational_delay_s is not None:
+        delay += Sampling(controller.sample_time_s, controller.computational_delay_s).mean_delay
+    if 0.0 < delay >= step.duration_s:
         raise refusal(
-            "this version designs state feedback (lqr) without delay",
-            "0 with an lqr controller, >= 0 and <= 1 without one",
-            at="/actuators/tab/delay_s",
+            f"controller {controller.name} answers {delay:g} s late: the response would be over by then",
+            f"> {delay:g} and <= 1000",
+            at="/reference/duration_s",
+        )
+
+
+#: Most states that commands on their way from a digital controller to the surfaces may take.
+MOST_UNDER_WAY = 48
+#: Most samples of a step that is followed from sample to sample.
+MOST_SAMPLES = 20_000
+
+
+def samples_within_reach(controller: Controller, actuators: Actuators, step: Reference, at: str) -> None:
+    """Refuse a sample time so short that delays or the step have more samples than can be followed."""
+    sample, computation = controller.sample_time_s, controller.computational_delay_s
+    if sample is None or computation is None:
+        return
+    moved = (actuators.tab, actuators.aileron) if isinstance(controller, Lqr) else (actuators.tab,)
+    # A command is under way for whole samples; a state feedback remembers it besides.
+    under_way = sum(ceil((actuator.delay_s + computation) / sample - 1e-9) for actuator in moved)
+    most = MOST_UNDER_WAY // len(moved)
+    if under_way > most:
+        raise refusal(
+            f"{under_way} commands of {controller.name} would be on their way at a time",
+            f"a sample time at which at most {most} commands are: delay and computation of each actuator, in samples",
+            at=f"{at}/sample_time_s",
+        )
+    if isinstance(controller, Lqr) and step.duration_s / sample > MOST_SAMPLES:
+        raise refusal(
+            f"the step is followed for {step.duration_s:g} s, {step.duration_s / sample:.0f} samples",
+            f">= {step.duration_s / MOST_SAMPLES:g} and <= 1, or null",
+            at=f"{at}/sample_time_s",
         )
 
 
@@ -94,11 +129,13 @@ class DesignRequest(LinearModelsRequest):
     )
 
     @model_validator(mode="after")
-    def tab_that_takes_the_commands(self) -> Self:
-        """Refuse an ideal tab actuator where gains that are chosen would have no bound, and a delay of torques."""
-        for controller in self.controllers:
+    def actuators_that_take_the_commands(self) -> Self:
+        """Refuse an ideal tab actuator where gains that are chosen would have no bound, and delays beyond the step."""
+        for place, controller in enumerate(self.controllers):
+            at = f"/controllers/{place}/{controller.kind}"
+            samples_within_reach(controller, self.actuators, self.reference, at)
             if isinstance(controller, Lqr):
-                no_delay_of_torques(self.actuators.tab)
+                step_longer_than_delays(controller, self.actuators, self.reference)
             elif controller.tab_command == "rate":
                 rate_loop_for(controller, self.actuators.tab)
             else:
@@ -106,19 +143,35 @@ class DesignRequest(LinearModelsRequest):
         return self
 
     @model_validator(mode="after")
-    def values_on_the_grid(self) -> Self:
-        """Every value that varies over the grid in its simplest form; refused unless it fits the grid."""
+    def a_tab_step_that_is_followed(self) -> Self:
+        """Refuse a step of the tab that no controller would follow."""
+        follows = any(isinstance(wanted, Lqr) and wanted.reference == "aileron_and_tab" for wanted in self.controllers)
+        if self.reference.tab_deg != 0.0 and not follows:
+            raise refusal(
+                "no controller follows a tab reference",
+                "0 unless a controller has the reference aileron_and_tab",
+                at="/reference/tab_deg",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def in_simplest_form(self) -> Self:
+        """Values over the grid and weights of regulators in their simplest form; refused unless they fit."""
         axes = GridAxes.of(self.grid)
-        changed: dict[str, Any] = {
-            "controllers": [
-                wanted.on_grid(axes, f"/controllers/{place}/{wanted.kind}") if isinstance(wanted, Classical) else wanted
-                for place, wanted in enumerate(self.controllers)
-            ]
-        }
+        controllers = [
+            self._in_place(wanted, axes, f"/controllers/{place}/{wanted.kind}")
+            for place, wanted in enumerate(self.controllers)
+        ]
+        changed: dict[str, Any] = {"controllers": controllers}
         if isinstance(self.spec_pack, SpecPack):
             specs = fields_on_grid(self.spec_pack.specs, axes, "/spec_pack/object/specs")
             changed["spec_pack"] = self.spec_pack.model_copy(update={"specs": specs})
         return self.model_copy(update=changed)
+
+    def _in_place(self, wanted: Controller, axes: GridAxes, at: str) -> Controller:
+        if isinstance(wanted, Lqr):
+            return wanted.on_plant(self.actuators, self.aerodynamics.damping, at)
+        return wanted.on_grid(axes, at)
 
 
 #: How near to the leading edge and a hinge, where it is infinite, the pressure may be asked for: fraction of the chord.

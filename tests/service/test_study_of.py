@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from design.classical.controller import ClassicalController
 from design.classical.steering import STEERABLE
 from design.classical.tab_drive import tab_drive
+from design.lqr.power_weights import NetWorkWeights, PowerBalancedWeights
 from design.lqr.synthesis import LqrController
 from design.lqr.weights import BrysonWeights, ExplicitWeights, weight_matrices
 from design.sampling import Sampling
@@ -74,6 +75,8 @@ def test_wind_tunnel_by_hand(wanted: Any) -> None:
     assert pf == ClassicalController("pf", "positive_feedback", (Spec("damping_ratio", "min", 0.4),))
     assert study.spec_pack == SPEC_PACKS["default"]
     assert isinstance(lqr, LqrController)
+    assert (lqr.reference, lqr.tab_allocation, lqr.delay_states) == ("aileron", "zero_aileron_torque", 0)
+    assert (lqr.sampling, lqr.measurement, study.reference.tab) == (None, None, 0.0)
     assert isinstance(lqr.weights, BrysonWeights)
     # Bryson's rule in radians: 2 deg of aileron weighs (180 / 2 pi)^2, 0.5 N m of tab torque 4.
     matrices = weight_matrices(lqr.weights)
@@ -347,10 +350,21 @@ def test_examples_of_design_requests_are_read() -> None:
     (nf,) = classical_of(studies["specs_over_the_grid"])
     assert {spec.quantity for spec in nf.specs if np.ndim(spec.limit) == 2} == {"damping_ratio", "settling_time"}
     assert [np.ndim(spec.limit) for spec in studies["specs_over_the_grid"].spec_pack] == [0, 2]
+    structures = regulators_of(studies["lqr_structures"])
+    assert [c.reference for c in structures] == ["none", "aileron", "aileron_and_tab"]
+    assert structures[1].tab_allocation == "least_torque"
+    before, after, net_work = regulators_of(studies["lqr_power"])
+    assert isinstance(after.weights, PowerBalancedWeights)
+    assert after.weights.base == before.weights
+    assert isinstance(net_work.weights, NetWorkWeights)
 
 
 def classical_of(study: Study) -> list[ClassicalController]:
     return [controller for controller in study.controllers if isinstance(controller, ClassicalController)]
+
+
+def regulators_of(study: Study) -> list[LqrController]:
+    return [controller for controller in study.controllers if isinstance(controller, LqrController)]
 
 
 def test_specs_of_a_request_are_those_that_steer() -> None:
