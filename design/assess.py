@@ -32,7 +32,8 @@ class Assessment(GridArrays):
     """Figures of a loop over the grid.
 
     Of a digital controller poles and margins are those of the loop from sample to sample, exact; step and demand are
-    those of the continuous loop that lags as much (`design.sampling.as_if_continuous`).
+    those of the continuous loop that lags as much (`design.sampling.as_if_continuous`). A sampled state feedback is
+    followed between its samples too (`design.lqr.sampled_assessment`).
 
     Attributes
     ----------
@@ -43,7 +44,8 @@ class Assessment(GridArrays):
     step : the aileron's response to the reference step
     demand : one for each actuator of the loop
     actuators : names of cuts and actuators, in that order
-    loop : what was judged
+    loop : what was judged; of a sampled state feedback the continuous loop that is run as code, without the gains on
+        commands under way
     """
 
     poles: ComplexArray
@@ -54,6 +56,16 @@ class Assessment(GridArrays):
     demand: tuple[ActuatorDemand, ...]
     actuators: tuple[str, ...]
     loop: Loop
+
+    @property
+    def stable(self) -> BoolArray:
+        """(*G,) all closed-loop poles are stable; with a delay, proved to be."""
+        return np.asarray(self.largest_real_part < 0.0)
+
+    @property
+    def return_difference(self) -> FloatArray:
+        """(*G, m) smallest ``|1 + L|`` at each cut, at most 1."""
+        return np.asarray(1.0 / np.stack([each.sensitivity_peak for each in self.margins], axis=-1))
 
     @cached_property
     def noise_gain(self) -> FloatArray | None:
@@ -77,7 +89,7 @@ def assess(
     flown = as_if_continuous(loop, sampling)
     response, chained = delayed_step_response(flown, reference, duration, samples), without_delay(flown)
     digital = None if sampling is None else digital_loop(loop, sampling)
-    found, damping, growth = _poles(loop) if digital is None else _sampled_poles(digital)
+    found, damping, growth = _poles(loop) if digital is None else _sampled_poles(digital, _waiting(loop, sampling))
     return Assessment(
         poles=found,
         damping_ratio=damping,
@@ -101,9 +113,14 @@ def _poles(loop: Loop) -> tuple[ComplexArray, FloatArray, FloatArray]:
     return delayed.poles, least_damping_ratio_delayed(loop), growth
 
 
-def _sampled_poles(loop: SampledLoop) -> tuple[ComplexArray, FloatArray, FloatArray]:
+def _waiting(loop: Loop, sampling: Sampling | None) -> int:
+    """Samples from a measurement to the arrival of the last of its commands."""
+    return 0 if sampling is None else int(np.ceil((max(loop.delay, default=0.0) + sampling.delay) / sampling.time))
+
+
+def _sampled_poles(loop: SampledLoop, waiting: int) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """Poles, least damping ratio and largest real part; of modes that are over after some samples, none."""
-    found = sampled_poles(loop.closed, loop.sample_time)
+    found = sampled_poles(loop.closed, loop.sample_time, waiting)
     lasting = np.where(np.isfinite(found.equivalent), found.equivalent, complex(np.nan, np.nan))
     return lasting, np.min(found.damping_ratio, axis=-1), np.max(found.equivalent.real, axis=-1)
 

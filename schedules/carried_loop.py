@@ -8,8 +8,11 @@ import numpy as np
 
 from design.classical.controller import ClassicalController
 from design.classical.tab_loop import tab_loop
+from design.estimation.rate_filters import with_rate_filters
 from design.loop import Loop
+from design.lqr.coded_loop import CodedLoop
 from design.lqr.flown import flown_loop
+from design.lqr.measurement import RateFilters
 from model.arrays import IntArray
 from model.linear_model import LinearModel
 from model.servo_tab import servo_tab
@@ -33,6 +36,10 @@ def carried_loop(
     designed : the controller
     model : (N,) the plants that are flown
     points : (N,) flat indices of the points whose gains are carried
+
+    Raises
+    ------
+    ValueError : a sampled state feedback, or one of estimates
     """
     request, at = designed.request, np.unravel_index(points, designed.outcomes.ok.shape)
     if isinstance(request, ClassicalController):
@@ -40,8 +47,16 @@ def carried_loop(
         servo = replace(servo_tab(model), dc_gain=plant.servo_tab.dc_gain[at])
         gains = {gain.name: gain.values[at] for gain in designed.gains}
         return tab_loop(model, servo, study.tab_actuator, request, gains)
-    if designed.riccati is None:
+    if designed.optimum is None:
         structure = request.structure(study.tab_actuator, study.aileron_actuator)
     else:
-        structure = designed.riccati.structure
-    return flown_loop(model, structure, designed.loop.K[at], designed.loop.N[at])
+        structure = designed.optimum.structure
+    if isinstance(designed.loop, CodedLoop) or designed.observer is not None:
+        raise ValueError(
+            f"controller {request.name} runs as code, or a model of its own point: only state feedback of measured "
+            "states or filtered rates is flown away from its point"
+        )
+    K = designed.loop.K if designed.optimum is None else designed.optimum.K
+    flown = flown_loop(model, structure, K[at], designed.loop.N[at])
+    measured = request.measurement
+    return with_rate_filters(flown, measured.cutoff) if isinstance(measured, RateFilters) else flown

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from design.assess import Assessment
+from design.estimation.kalman_filter import KalmanFilter
 from design.gains import Gain
 from design.loop import Loop
+from design.lqr.coded_loop import CodedLoop
+from design.lqr.sampled_design import SampledLqrDesign
 from design.lqr.synthesis import LqrDesign
 from design.lqr.weights import WeightsRefused
 from design.outcome import Outcomes
@@ -27,14 +30,15 @@ class DesignedController:
     outcomes : (*G,)
     gains : each (*G,), nan where the outcome is not ok
     loop : over the whole grid, nan where the outcome is not ok; of a digital controller the continuous loop that lags
-        as much
+        as much, of a sampled state feedback the loop as it is coded
     assessment : over the whole grid, nan where the outcome is not ok; None when no point is
     fastest_mode : (*G,) fastest closed-loop mode of the surfaces that the air moves (`design.frequency.fastest_mode`)
         [rad/s]: both of them with state feedback, the aileron where the tab's position is imposed; nan where the
         outcome is not ok
     reduced_frequency : (*G,) k of that mode [-]
     verdicts : one per spec
-    riccati : solution and certificate of the LQR; None for classical controllers
+    optimum : solution and certificate of the LQR; None for classical controllers
+    observer : Kalman filter whose estimates a state feedback reads; None elsewhere
     infeasibility : (*G,) why a classical design has no gains (`design.classical.infeasibility.Infeasibility`), None
         elsewhere; None for other controllers
     smoothed : what was given up for gains that vary smoothly; None where nothing was asked for
@@ -43,12 +47,13 @@ class DesignedController:
     request: Controller
     outcomes: Outcomes
     gains: tuple[Gain, ...]
-    loop: Loop
+    loop: Loop | CodedLoop
     assessment: Assessment | None
     fastest_mode: ComplexArray
     reduced_frequency: FloatArray
     verdicts: tuple[Verdict, ...]
-    riccati: LqrDesign | None
+    optimum: LqrDesign | SampledLqrDesign | None = None
+    observer: KalmanFilter | None = None
     infeasibility: ObjectArray | None = None
     smoothed: Smoothed | None = None
 

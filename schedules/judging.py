@@ -10,7 +10,8 @@ from design.delay.with_pade import without_delay
 from design.frequency.fastest_mode import fastest_surface_mode
 from design.gains import Gain
 from design.loop import Loop
-from design.lqr.synthesis import LqrDesign
+from design.lqr.coded_loop import CodedLoop
+from design.lqr.sampled_assessment import assess_sampled
 from design.outcome import Outcome, Outcomes
 from design.sampling import Sampling, as_if_continuous
 from design.specs import Spec
@@ -47,51 +48,60 @@ def judged(
     request: Controller,
     outcomes: Outcomes,
     gains: tuple[Gain, ...],
-    loop: Loop,
-    riccati: LqrDesign | None,
+    loop: Loop | CodedLoop,
 ) -> DesignedController:
     """Judge the loop as it is flown, and withdraw every gain that this second look does not bear out."""
     ok = outcomes.ok
     if not np.any(ok):
         none = np.full(ok.shape, np.nan)
-        return DesignedController(request, outcomes, gains, loop, None, none.astype(complex), none, (), riccati)
+        return DesignedController(request, outcomes, gains, loop, None, none.astype(complex), none, ())
     step, duration = study.reference.sizes(loop.references), horizon(study, request)
     try:
-        found = assess(loop.take(ok), step, duration, sampling=_sampling(request)).spread(ok)
+        found = _assessed(request, loop.take(ok), step, duration).spread(ok)
         fastest = _fastest_mode(request, loop, ok)
         checked = _certify(outcomes, found, _steering(request), gains, plant)
     except np.linalg.LinAlgError as error:
         checked = _without_unjudgeable(outcomes, request, loop, step, duration, str(error))
     if not np.array_equal(checked.ok, ok):
         kept = loop.take(checked.ok).spread(checked.ok)
-        return judged(study, plant, request, checked, _kept(gains, checked), kept, riccati)
+        return judged(study, plant, request, checked, _kept(gains, checked), kept)
     frequency = reduced_frequency(fastest[..., None], plant.grid.condition, study.geometry.chord)[..., 0]
     actuators = {"tab": study.tab_actuator, "aileron": study.aileron_actuator}
     said = verdicts(found, ok, asked(request), study.spec_pack, actuators)
-    flown = as_if_continuous(loop, _sampling(request))
-    return DesignedController(request, outcomes, gains, flown, found, fastest, frequency, said, riccati)
+    flown = loop if isinstance(loop, CodedLoop) else as_if_continuous(loop, _sampling(request))
+    return DesignedController(request, outcomes, gains, flown, found, fastest, frequency, said)
 
 
 def figures_at(study: Study, request: Controller, loop: Loop, where: BoolArray) -> Assessment | None:
     """The loop's figures at the points of a mask, in one row; None where their numbers cannot be judged together."""
     step, duration = study.reference.sizes(loop.references), horizon(study, request)
     try:
-        return assess(loop.take(where), step, duration, sampling=_sampling(request))
+        return _assessed(request, loop.take(where), step, duration)
     except np.linalg.LinAlgError:
         return None
 
 
-def _fastest_mode(request: Controller, loop: Loop, ok: BoolArray) -> ComplexArray:
+def _assessed(request: Controller, loop: Loop | CodedLoop, step: FloatArray, duration: float) -> Assessment:
+    """Figures of a loop that is finite everywhere."""
+    if isinstance(loop, CodedLoop):
+        return assess_sampled(loop, step, duration)
+    return assess(loop, step, duration, sampling=_sampling(request))
+
+
+def _fastest_mode(request: Controller, loop: Loop | CodedLoop, ok: BoolArray) -> ComplexArray:
     """Fastest closed-loop mode of the surfaces that the air moves (*G,) [rad/s], nan where there is no design."""
     fastest = np.full(ok.shape, complex(np.nan, np.nan))
     surfaces = ("da",) if isinstance(request, ClassicalController) else ("dt", "da")
+    if isinstance(loop, CodedLoop):
+        fastest[ok] = fastest_surface_mode(loop.closed[ok], loop.states, surfaces, loop.sampling.time)
+        return fastest
     chained = without_delay(loop.take(ok))
     fastest[ok] = fastest_surface_mode(chained.closed, chained.states, surfaces)
     return fastest
 
 
 def _without_unjudgeable(
-    outcomes: Outcomes, request: Controller, loop: Loop, step: FloatArray, duration: float, together: str
+    outcomes: Outcomes, request: Controller, loop: Loop | CodedLoop, step: FloatArray, duration: float, together: str
 ) -> Outcomes:
     """One point whose numbers LAPACK gives up on must not lose the others: find such points one by one.
 
@@ -100,7 +110,7 @@ def _without_unjudgeable(
     reasons = np.full(outcomes.ok.shape, None, dtype=object)
     for index in map(tuple, np.argwhere(outcomes.ok)):
         try:
-            assess(loop.take(index), step, duration, sampling=_sampling(request))
+            _assessed(request, loop.take(index), step, duration)
             _fastest_mode(request, loop.take(index), np.array(True))
         except np.linalg.LinAlgError as error:
             reasons[index] = str(error)

@@ -17,8 +17,7 @@ from design.classical.synthesis import (
 )
 from design.classical.tab_loop import tab_loop
 from design.gains import Gain
-from design.lqr.synthesis import LqrController, design_lqr
-from design.lqr.torque_loop import gains, lqr_loop
+from design.lqr.controller import LqrController
 from design.lqr.weights import WeightsRefused
 from design.outcome import Outcomes
 from schedules.analysis import PlantEnvelope, analyse
@@ -27,6 +26,7 @@ from schedules.envelope_warnings import envelope_warnings
 from schedules.judging import figures_at, horizon, judged
 from schedules.second_try import TRIES, missed_a_little
 from schedules.smoothing import smooth
+from schedules.state_feedback import state_feedback
 from schedules.study import Controller, Study
 
 
@@ -105,17 +105,13 @@ def _flown(
 ) -> DesignedController:
     """The loop of a classical controller with these gains, judged."""
     loop = tab_loop(plant.model, plant.servo_tab, study.tab_actuator, request, gain_values(gains))
-    return judged(study, plant, request, outcomes, gains, loop, None)
+    return judged(study, plant, request, outcomes, gains, loop)
 
 
 def _lqr(study: Study, plant: PlantEnvelope, request: LqrController) -> DesignedController:
-    if request.sampling is not None or request.measurement is not None:
-        raise ValueError(
-            f"controller {request.name}: over a grid, state feedback is designed in continuous time with all states "
-            "measured; see design.lqr.sampled_design and design.estimation"
-        )
     try:
-        found = design_lqr(plant.model, request, plant.outcomes, study.tab_actuator, study.aileron_actuator)
+        found = state_feedback(study, plant, request)
     except WeightsRefused as refused:
         raise ControllerRefused(request.name, refused) from refused
-    return judged(study, plant, request, found.outcomes, gains(found), lqr_loop(plant.model, found), found)
+    designed = judged(study, plant, request, found.outcomes, found.gains, found.loop)
+    return replace(designed, optimum=found.optimum, observer=found.observer)

@@ -11,6 +11,8 @@ from design.assess import Assessment, achieved
 from design.classical.controller import ClassicalController
 from design.classical.tab_loop import tab_loop
 from design.gains import Gain
+from design.loop import Loop
+from design.lqr.synthesis import LqrDesign
 from design.lqr.torque_loop import lqr_loop
 from design.outcome import Outcomes
 from design.specs import Spec
@@ -100,6 +102,10 @@ def scaling_law(study: Study, plant: PlantEnvelope, designed: DesignedController
     ----------
     study, plant : of which the controller is one
     designed : its per-point design
+
+    Raises
+    ------
+    ValueError : a state feedback that runs as code, or does not measure all its states
     """
     condition = plant.grid.condition
     laws = fit_laws(condition, designed.gains, designed.outcomes.ok)
@@ -120,13 +126,15 @@ def _flown(
     if isinstance(request, ClassicalController):
         request = replace(request, gains=values, smoothness=0.0)
         loop = tab_loop(plant.model, plant.servo_tab, study.tab_actuator, request, values)
-        return judged(study, plant, request, outcomes, gains, loop, None)
-    if designed.riccati is None:
-        raise ValueError(f"controller {request.name} has no state feedback whose gains could be replaced")
+        return judged(study, plant, request, outcomes, gains, loop)
+    if not isinstance(designed.optimum, LqrDesign) or not isinstance(designed.loop, Loop) or request.measurement:
+        raise ValueError(
+            f"controller {request.name} is no continuous feedback of measured states, whose gains could be replaced"
+        )
     K = _matrix("K", plant.model.inputs, designed.loop.states, values)
     N = _matrix("N", plant.model.inputs, designed.loop.references, values)
-    loop = lqr_loop(plant.model, replace(designed.riccati, K=K, N=N, outcomes=outcomes))
-    return judged(study, plant, request, outcomes, gains, loop, None)
+    loop = lqr_loop(plant.model, replace(designed.optimum, K=K, N=N, outcomes=outcomes))
+    return judged(study, plant, request, outcomes, gains, loop)
 
 
 def _matrix(symbol: str, rows: Sequence[str], columns: Sequence[str], values: dict[str, FloatArray]) -> FloatArray:

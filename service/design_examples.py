@@ -26,6 +26,8 @@ def design_requests() -> dict[str, tuple[str, dict[str, Any]]]:
         "given_gains": ("gains that are given, all of them or some", _given_gains()),
         "specs_over_the_grid": ("specs that vary over the grid, and a spec pack of one's own", _specs_that_vary()),
         "lqr_structures": ("a regulator, an aileron and both surfaces following references", _lqr_structures()),
+        "lqr_measured": ("every state measured, filtered rates, a Kalman filter", _lqr_measured()),
+        "lqr_sampled": ("state feedback designed for a sample time", _lqr_sampled()),
         "lqr_power": ("power of the actuators weighed, and not", _lqr_power()),
     }
 
@@ -103,6 +105,37 @@ def _lqr_structures() -> dict[str, Any]:
     document["actuators"]["tab"] |= {"torque_loop_bandwidth_hz": 80.0, "delay_s": 0.001}
     document["actuators"]["aileron"] |= {"torque_loop_bandwidth_hz": 80.0}
     return document
+
+
+def _lqr_measured() -> dict[str, Any]:
+    """One regulator of all states, of angles with their filtered derivatives, and of estimates (seed 6.3, 7.3)."""
+    kalman = {
+        "kind": "kalman",
+        "tab_torque_noise": 0.002,
+        "aileron_torque_noise": 0.01,
+        "tab_angle_noise_deg": 0.001,
+        "aileron_angle_noise_deg": 0.002,
+    }
+    return _wind_tunnel(
+        "lqr_measured",
+        [
+            _lqr("all_states"),
+            _lqr("filtered", measurement={"kind": "rate_filters", "cutoff_hz": 300.0}),
+            _lqr("estimated", measurement=kalman),
+            _lqr("recovered", measurement=kalman | {"recovery": 10.0}),
+        ],
+    )
+
+
+def _lqr_sampled() -> dict[str, Any]:
+    """At 500 Hz with one sample of delay, and at 100 Hz without any (seed 6.4.2)."""
+    return _wind_tunnel(
+        "lqr_sampled",
+        [
+            _lqr("at_500_hz", sample_time_s=0.002),
+            _lqr("at_100_hz", sample_time_s=0.01, computational_delay_s=0.0),
+        ],
+    )
 
 
 def _lqr_power() -> dict[str, Any]:

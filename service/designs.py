@@ -11,6 +11,8 @@ from typing import TypeVar
 import numpy as np
 import orjson
 
+from design.loop import Loop
+from design.lqr.coded_loop import CodedLoop
 from design.lqr.output_weights import OutputWeights
 from design.lqr.power_weights import NetWorkWeights, PowerBalancedWeights, Weights
 from design.lqr.synthesis import LqrController
@@ -27,7 +29,7 @@ from service.envelopes import Envelopes
 from service.limits import check_envelope
 from service.presenters.design import design_document
 from service.presenters.grid import grid_index
-from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound, StaleDesign
+from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound, NotOffered, StaleDesign
 from service.schemas.requests import DesignRequest, LinearModelsRequest
 from service.store import DesignStore, ListedDesign, StoredDesign
 from service.version import code_version
@@ -221,6 +223,31 @@ def controller_of(envelope: DesignedEnvelope, name: str) -> DesignedController:
     except KeyError:
         names = ", ".join(controller.request.name for controller in envelope.controllers)
         raise NotFound(f"there is no controller {name[:80]!a}; there are {names}") from None
+
+
+def continuous_loop(controller: DesignedController) -> Loop:
+    """The controller's loop in continuous time.
+
+    Raises
+    ------
+    NotOffered : a sampled state feedback, which has none
+    """
+    if isinstance(controller.loop, CodedLoop):
+        raise NotOffered(f"the controller {controller.request.name} is a sampled state feedback, which runs as code")
+    return controller.loop
+
+
+def measuring_all(controller: DesignedController) -> None:
+    """Refuse a state feedback that runs as code, or works out its states from the angles.
+
+    Raises
+    ------
+    NotOffered
+    """
+    continuous_loop(controller)
+    request = controller.request
+    if isinstance(request, LqrController) and request.measurement is not None:
+        raise NotOffered(f"the controller {request.name} does not measure all its states")
 
 
 def point_with_gains(envelope: DesignedEnvelope, controller: DesignedController, point: int) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ from service.refusals import FieldRefusal, InvalidRequest, LimitExceeded
 from service.schemas import aerodynamics, flight
 from service.schemas.actuators import Actuators
 from service.schemas.controller_requests import Controller
-from service.schemas.lqr_requests import Lqr
+from service.schemas.lqr_requests import KalmanFilter, Lqr
 from service.schemas.requests import DesignRequest, LinearModelsRequest
 from service.schemas.studies import EigenvalueSweepRequest, SteadyStateMapRequest
 from service.schemas.weights import PowerWeights
@@ -140,13 +140,12 @@ def check_design(request: DesignRequest, settings: Settings) -> None:
     """
     points, controllers = check_plant(request, settings), len(request.controllers)
     check_size("/controllers", "controllers", controllers, "max_controllers", settings)
-    _check_wired(request)
     work = points * controllers
     check_size("/grid", "grid points times controllers", work, "max_point_designs", settings)
     searches = points * sum(_searches(wanted, request.actuators) for wanted in request.controllers)
     what = (
         "searches: grid points times tab-only controllers whose gains are chosen and lqr controllers with powers to "
-        "meet or with delays, these times 1 + delay_states // 2"
+        "meet or with delays, these times 1 + delay_states // 2, and 4 more with a Kalman filter"
     )
     check_size("/grid", what, searches, "max_tab_only_designs", settings)
 
@@ -159,7 +158,8 @@ def _searches(wanted: Controller, actuators: Actuators) -> int:
     powers = isinstance(wanted.weights, PowerWeights) and (
         wanted.weights.form == "balanced" or wanted.weights.keep_settling
     )
-    return (1 + wanted.delay_states // 2 if delayed else 0) + (1 if powers else 0)
+    late = 1 + wanted.delay_states // 2 + (4 if isinstance(wanted.measurement, KalmanFilter) else 0) if delayed else 0
+    return late + (1 if powers else 0)
 
 
 def check_envelope(study: PlantStudy) -> None:
@@ -180,21 +180,3 @@ def check_envelope(study: PlantStudy) -> None:
 
 def _length(axis: flight.Axis) -> int:
     return axis.count if isinstance(axis, flight.Span) else len(axis)
-
-
-def _check_wired(request: DesignRequest) -> None:
-    """Refuse what state feedback can be designed for in Python, and this version does not judge over a grid yet.
-
-    Raises
-    ------
-    InvalidRequest
-    """
-    for place, wanted in enumerate(request.controllers):
-        if not isinstance(wanted, Lqr):
-            continue
-        for field in ("sample_time_s", "measurement"):
-            if getattr(wanted, field) is not None:
-                pointer = f"/controllers/{place}/{field}"
-                detail = "this version designs state feedback in continuous time, all states measured"
-                unit = "s" if field == "sample_time_s" else None
-                raise InvalidRequest(f"{pointer}: {detail}", FieldRefusal(pointer, detail, unit, "null"))

@@ -60,6 +60,10 @@ class NoDesignAtPoint(Refusal):
     """The controller has no gains at that grid point; the detail says why."""
 
 
+class NotOffered(Refusal):
+    """The question makes no sense, or is not answered, for a controller of this kind; the detail says why."""
+
+
 class StaleDesign(Refusal):
     """The stored design was made by other code, and this code would answer differently."""
 

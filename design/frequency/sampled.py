@@ -18,6 +18,10 @@ from design.frequency.poles import damping_ratio, pole_order
 from design.frequency.transfer import transfer
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays
 
+#: A mode that has decayed by this within the longest delay cannot be told from one at z = 0, which is over after it:
+#: so far does rounding carry the many poles that a delay puts there.
+OVER = 1e-13
+
 
 @dataclass(frozen=True, eq=False)
 class DiscreteLoop(GridArrays):
@@ -91,19 +95,22 @@ class SampledPoles(GridArrays):
     stable: BoolArray
 
 
-def sampled_poles(A: FloatArray, sample_time: float) -> SampledPoles:
+def sampled_poles(A: FloatArray, sample_time: float, waiting: int = 0) -> SampledPoles:
     """Poles of ``x_(k+1) = A x_k``.
 
     Parameters
     ----------
     A : (*G, n, n), finite
     sample_time : [s]
+    waiting : samples that the longest delay in the loop takes. It puts as many poles at z = 0, where rounding strews
+        them far: modes that are over within it are taken to be these
 
     Raises
     ------
     numpy.linalg.LinAlgError : an entry is not finite
     """
     z = np.linalg.eigvals(A).astype(complex)
+    z[np.abs(z) <= OVER ** (1.0 / max(waiting, 1))] = 0.0
     equivalent = np.empty_like(z)
     with np.errstate(divide="ignore"):
         equivalent.real, equivalent.imag = np.log(np.abs(z)) / sample_time, np.angle(z) / sample_time

@@ -64,6 +64,16 @@ class CodedLoop(GridArrays):
     sampling: Sampling
     remembered: bool
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the commands."""
+        return self.continuous.inputs
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Names of the references."""
+        return self.continuous.references
+
     @cached_property
     def closed(self) -> FloatArray:
         """``F - G K`` (*G, s, s)."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from design.lqr.allocation import TabAllocation
-from design.lqr.measurement import Measurement
+from design.lqr.measurement import KalmanMeasurement, Measurement, RateFilters
 from design.lqr.power_weights import Weights
 from design.lqr.structures import Reference, Structure
 from design.sampling import Sampling
@@ -42,6 +42,25 @@ class LqrController:
     def kind(self) -> Literal["lqr"]:
         """Kind of controller, as in requests and files."""
         return "lqr"
+
+    @property
+    def law(self) -> str:
+        """The control law in one line, with the gains by name."""
+        forward = "" if self.reference == "none" else " + N r"
+        if self.sampling is not None:
+            return (
+                f"u_k = -K [x_k, u_(k-1), ..]{forward}, u = [T_t, T_a], every {self.sampling.time:g} s, commanded "
+                f"{self.sampling.delay:g} s after it is measured; integrals by the trapezoidal rule"
+            )
+        law = f"u = -K x{forward}, u = [T_t, T_a]"
+        if isinstance(self.measurement, RateFilters):
+            return (
+                f"{law}; the rates in x are w s/(s + w) of the measured angles, w = {self.measurement.cutoff:.9g} rad/s"
+            )
+        if isinstance(self.measurement, KalmanMeasurement):
+            estimate = "z' = A z + B v + L ([dt, da] - [z_dt, z_da]), v the torques that reach the actuators"
+            return f"{law}; x estimated, but for the integrals: {estimate}"
+        return law
 
     def structure(self, tab: Actuator, aileron: Actuator) -> Structure:
         """What is built around the model with these actuators.

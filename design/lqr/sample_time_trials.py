@@ -7,9 +7,10 @@ from typing import Literal
 
 import numpy as np
 
+from design.assess import Assessment, achieved
 from design.lqr.coded_loop import CodedLoop
 from design.lqr.controller import LqrController
-from design.lqr.sampled_assessment import SampledAssessment, assess_sampled
+from design.lqr.sampled_assessment import assess_sampled
 from design.lqr.sampled_design import design_lqr_sampled, emulated_lqr_loop, sampled_lqr_loop
 from design.lqr.synthesis import LqrDesign
 from design.sampling import Sampling
@@ -95,11 +96,11 @@ class Question:
         figures, reasons = np.full((*outcomes.ok.shape, len(self.figures)), np.nan), outcomes.reasons.copy()
         stable = self._stable(loop, outcomes.ok, figures, reasons)
         if np.any(stable):
-            figures[stable] = self._judged(assess_sampled(loop.take(stable), self.reference, self.duration))
+            figures[stable] = self._judged(assess_sampled(loop.take(stable), self.reference, self.duration), time)
         values = [figures[..., self.figures.index(spec.quantity)] for spec in self.specs]
         met = np.zeros((*stable.shape, len(self.specs)), dtype=bool)
-        for q, (spec, achieved) in enumerate(zip(self.specs, values, strict=True)):
-            met[..., q] = stable & spec.met(achieved)
+        for q, (spec, value) in enumerate(zip(self.specs, values, strict=True)):
+            met[..., q] = stable & spec.met(value)
         passed = np.asarray(stable & met.all(axis=-1))
         for index in map(tuple, np.argwhere(stable & ~passed)):
             missed = (
@@ -119,10 +120,11 @@ class Question:
             reasons[index] = f"the coded loop has a pole of modulus {radius[index]:.6g}"
         return np.asarray(radius < 1.0)
 
-    def _judged(self, found: SampledAssessment) -> FloatArray:
+    def _judged(self, found: Assessment, time: float) -> FloatArray:
         """Figures (N, f) of loops that are stable."""
-        own = {"spectral_radius": found.spectral_radius, "return_difference": found.return_difference.min(axis=-1)}
-        values = [own[name] if name in own else found.value(name) for name in self.figures]
+        radius, difference = np.exp(found.largest_real_part * time), found.return_difference.min(axis=-1)
+        own = {"spectral_radius": radius, "return_difference": difference}
+        values = [own[name] if name in own else achieved(found, name) for name in self.figures]
         return np.stack([value for value in values if value is not None], axis=-1)
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TypeVar
 
 import numpy as np
 
+from design.assess import Assessment
 from design.frequency.bandwidth import bandwidth
-from design.frequency.margins import Margins
 from design.frequency.sampled import sampled_margins, sampled_poles
 from design.lqr.coded_loop import CodedLoop
 from design.lqr.sampled_response import SampledResponse, breaks_of, intervals, sampled_step_response
@@ -18,9 +17,6 @@ from design.response.demand import ActuatorDemand, actuator_demands
 from design.response.step_metrics import BAND, RISE, StepMetrics
 from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
 
-#: A mode that has decayed by this within the longest delay cannot be told from one at z = 0, which is over after it:
-#: so far does rounding carry the many poles that a delay puts there.
-OVER = 1e-13
 #: An overshoot below this is rounding, and has no peak time.
 PEAK_RESOLUTION = 1e-9
 #: Numbers of the states of a response that are held at once.
@@ -29,68 +25,11 @@ PART = 2_000_000
 _Result = TypeVar("_Result", bound=GridArrays)
 
 
-@dataclass(frozen=True, eq=False)
-class SampledAssessment(GridArrays):
-    """Figures of a coded loop over the grid; those of the step are between the samples as well as at them.
+def assess_sampled(loop: CodedLoop, reference: FloatArray, duration: float) -> Assessment:
+    """Judge a coded loop whose matrices are finite at every point; the step is followed between its samples too.
 
-    Attributes
-    ----------
-    poles : (*G, s) ``ln z / T`` of the closed loop's poles [rad/s]; nan for modes that are over after the delay
-    damping_ratio : (*G,) smallest of their damping ratios
-    spectral_radius : (*G,) largest modulus of z
-    margins : one for each actuator, at which the loop is cut between the code and the plant, the others closed
-    step : the aileron's response to the reference step, met at a sample; bandwidth is of ``r_a -> da`` at the samples
-    demand : one for each actuator
-    actuators : names of cuts and actuators, in that order
-    """
-
-    poles: ComplexArray
-    damping_ratio: FloatArray
-    spectral_radius: FloatArray
-    margins: tuple[Margins, ...]
-    step: StepMetrics
-    demand: tuple[ActuatorDemand, ...]
-    actuators: tuple[str, ...]
-
-    @property
-    def stable(self) -> BoolArray:
-        """(*G,) all poles inside the unit circle."""
-        return np.asarray(self.spectral_radius < 1.0)
-
-    @property
-    def return_difference(self) -> FloatArray:
-        """(*G, m) smallest ``|1 + L|`` at each cut, at most 1: nothing keeps that of a sampled loop at 1."""
-        return 1.0 / np.stack([each.sensitivity_peak for each in self.margins], axis=-1)
-
-    def value(self, quantity: str) -> FloatArray | None:
-        """(*G,) value of a quantity of `design.specs.QUANTITIES`; None for what a torque loop does not have.
-
-        Of several cuts the worst one counts.
-        """
-        cuts = self.margins
-        worst: dict[str, Callable[[], FloatArray]] = {
-            "gain_margin": lambda: np.min(
-                [np.minimum(m.gain_margin_up_db, -m.gain_margin_down_db) for m in cuts], axis=0
-            ),
-            "phase_margin": lambda: np.min([m.phase_margin for m in cuts], axis=0),
-            "disk_margin": lambda: np.min([m.disk_margin for m in cuts], axis=0),
-            "sensitivity_peak": lambda: np.max([m.sensitivity_peak for m in cuts], axis=0),
-            "delay_margin": lambda: np.min([m.delay_margin for m in cuts], axis=0),
-            "bandwidth": lambda: self.step.bandwidth,
-            "damping_ratio": lambda: self.damping_ratio,
-            "settling_time": lambda: self.step.settling_time,
-            "overshoot": lambda: self.step.overshoot,
-        }
-        if quantity in worst:
-            return np.asarray(worst[quantity]())
-        actuator, _, what = quantity.partition("_")
-        if actuator not in self.actuators:
-            return None
-        return np.asarray(getattr(self.demand[self.actuators.index(actuator)], f"peak_{what}"))
-
-
-def assess_sampled(loop: CodedLoop, reference: FloatArray, duration: float) -> SampledAssessment:
-    """Judge a coded loop whose matrices are finite at every point.
+    Poles are ``ln z / T``, nan for modes that are over after the delay. The loop is cut between the code and the plant.
+    The reference step is met at a sample, and its bandwidth is that of ``r_a -> da`` at the samples.
 
     Parameters
     ----------
@@ -104,19 +43,18 @@ def assess_sampled(loop: CodedLoop, reference: FloatArray, duration: float) -> S
         way included where the code remembers them
     """
     grid = loop.A.shape[:-2]
-    found = sampled_poles(loop.closed, loop.sampling.time)
-    size, longest = np.abs(found.z), max(loop.waiting, default=0)
-    lasting = size > OVER ** (1.0 / max(longest, 1))
+    found = sampled_poles(loop.closed, loop.sampling.time, max(loop.waiting, default=0))
     step, demand = _followed(loop, np.asarray(reference, dtype=float), duration)
     margins = sampled_margins(loop.opened().cuts())
-    return SampledAssessment(
-        poles=np.where(lasting, found.equivalent, complex(np.nan, np.nan)),
-        damping_ratio=np.min(np.where(lasting, found.damping_ratio, 1.0), axis=-1),
-        spectral_radius=size.max(axis=-1),
+    return Assessment(
+        poles=np.where(np.isfinite(found.equivalent), found.equivalent, complex(np.nan, np.nan)),
+        damping_ratio=np.min(found.damping_ratio, axis=-1),
+        largest_real_part=np.max(found.equivalent.real, axis=-1),
         margins=tuple(margins.take(i) for i in range(loop.B.shape[-1])),
         step=_reshaped(step, grid),
         demand=tuple(_reshaped(each, grid) for each in demand),
         actuators=loop.continuous.inputs,
+        loop=loop.continuous,
     )
 
 

@@ -10,6 +10,8 @@ from design.disturbance.closed_system import closed_system
 from design.disturbance.frequency_response import FrequencyResponse, frequency_response
 from design.disturbance.loop_responses import loop_responses
 from design.loop import Loop
+from design.lqr.coded_loop import CodedLoop
+from design.lqr.coded_responses import coded_responses
 from model.arrays import FloatArray
 from service.signal_units import command_signals, ratio_unit, signal_unit
 
@@ -39,6 +41,24 @@ def frequency_response_document(loop: Loop, omega: FloatArray) -> dict[str, Any]
         "reference": _transfers(seen, loop.references, commands),
         "disturbance": _transfers(seen, torques, commands),
         "noise": _transfers(seen, noise, commands),
+        "singular_values": {name: response.singular_values.T for name, response in loops.items()},
+    }
+
+
+def coded_responses_document(loop: CodedLoop, omega: FloatArray) -> dict[str, Any]:
+    """The same of a loop that runs as code, at its samples; disturbances and noise left out."""
+    commands, nothing = command_signals(loop.continuous.outputs, loop.inputs), list[dict[str, Any]]()
+    found = coded_responses(loop, omega)
+    loops = {"loop": found.loop, "sensitivity": found.sensitivity, "complementary": found.complementary}
+    seen = [found.reference.outputs.index(name) for name in _OUTPUTS]
+    reference = FrequencyResponse(omega, found.reference.value[:, seen, :], loop.references, _OUTPUTS)
+    return {
+        "omega_rad_s": omega,
+        **{name: _transfers(response, response.inputs, commands) for name, response in loops.items()},
+        "control": _transfers(found.command, loop.references, commands),
+        "reference": _transfers(reference, loop.references, commands),
+        "disturbance": nothing,
+        "noise": nothing,
         "singular_values": {name: response.singular_values.T for name, response in loops.items()},
     }
 

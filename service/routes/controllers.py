@@ -9,19 +9,21 @@ from pydantic import BaseModel, Field
 
 from design.classical.controller import ClassicalController
 from design.delay.step_response import delayed_step_response
+from design.lqr.coded_loop import CodedLoop
+from design.lqr.sampled_response import sampled_step_response
 from schedules.designed import DesignedEnvelope
 from schedules.interpolate import interpolate
 from schedules.run import design_margins
 from schedules.schedule_of import schedule_of
 from schedules.wire_names import axis_name
 from service.answering import answer, encode
-from service.designs import controller_of, point_with_gains
+from service.designs import controller_of, measuring_all, point_with_gains
 from service.limits import check_size
 from service.openapi import problems
 from service.presenters.design_margin import design_margin_document
 from service.presenters.gains import gains_document
 from service.presenters.requirements import reference_document, requirements_document
-from service.presenters.response import response_document
+from service.presenters.response import response_document, sampled_response_document
 from service.presenters.scaling import scaling_document
 from service.presenters.verdicts import verdicts_document
 from service.refusals import FieldRefusal, InvalidRequest
@@ -80,9 +82,13 @@ def response(
     reference = envelope.study.reference
     duration = wanted.duration_s or reference.duration
     loop = controller.loop.take(index)
-    found = delayed_step_response(loop, reference.sizes(loop.references), duration, wanted.samples)
-    document = {"name": name, "point": wanted.point, "kind": wanted.kind}
-    return answer(request, encode(document | reference_document(reference, duration) | response_document(found)))
+    step = reference.sizes(loop.references)
+    document = {"name": name, "point": wanted.point, "kind": wanted.kind} | reference_document(reference, duration)
+    if isinstance(loop, CodedLoop):
+        shown = sampled_response_document(sampled_step_response(loop, step, duration), wanted.samples)
+    else:
+        shown = response_document(delayed_step_response(loop, step, duration, wanted.samples))
+    return answer(request, encode(document | shown))
 
 
 @router.get(
@@ -121,7 +127,9 @@ def design_margin(request: Request, ident: DesignId, name: ControllerName, desig
 def scaling(request: Request, ident: DesignId, name: ControllerName, designs: DesignsHere) -> Response:
     """The gains as powers of dynamic pressure and mass flux, what such a schedule loses, and scaled poles."""
     envelope = designs.envelope(ident)
-    return answer(request, encode(scaling_document(envelope, controller_of(envelope, name))))
+    controller = controller_of(envelope, name)
+    measuring_all(controller)
+    return answer(request, encode(scaling_document(envelope, controller)))
 
 
 @router.get("/gains", response_model=InterpolatedGains, responses=problems(404, 409, 422, 503), dependencies=[HEAVY])

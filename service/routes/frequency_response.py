@@ -10,12 +10,14 @@ from pydantic import BaseModel, Field
 
 from design.disturbance.frequency_response import response_frequencies
 from design.frequency.poles import poles
+from design.frequency.sampled import sampled_poles
+from design.lqr.coded_loop import CodedLoop
 from model.arrays import ComplexArray
 from service.answering import answer, encode
 from service.designs import controller_of, point_with_gains
 from service.limits import check_size
 from service.openapi import problems
-from service.presenters.frequency_response import frequency_response_document
+from service.presenters.frequency_response import coded_responses_document, frequency_response_document
 from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.controllers import ControllerName, Point
 from service.routes.designs import DesignId
@@ -57,30 +59,40 @@ def frequency_response_of_controller(
 ) -> Response:
     """Loop, S, T and KS at the actuators' commands, and the transfers of reference, disturbances and noise.
 
-    Transport delays are in them exactly. The loop is the one that is opened at all commands at once.
+    Transport delays are in them exactly. The loop is the one that is opened at all commands at once. Those of a sampled
+    state feedback are from sample to sample, up to half the sampling rate; disturbances and noise are left out.
     """
     check_size("/count", "frequencies", wanted.count, "max_response_samples", settings)
     envelope = designs.envelope(ident)
     controller = controller_of(envelope, name)
     loop = controller.loop.take(point_with_gains(envelope, controller, wanted.point))
-    found = poles(loop.closed)
-    low, high = _range(found, wanted)
-    omega = response_frequencies(found, low, high, wanted.count)
     document = {"name": name, "point": wanted.point}
-    return answer(request, encode(document | frequency_response_document(loop, omega)))
+    if isinstance(loop, CodedLoop):
+        found = sampled_poles(loop.closed, loop.sampling.time, max(loop.waiting, default=0)).equivalent
+        found = found[np.isfinite(found)]
+        low, high = _range(found, wanted, fastest=float(np.pi / loop.sampling.time))
+        responses = coded_responses_document(loop, response_frequencies(found, low, high, wanted.count))
+    else:
+        found = poles(loop.closed)
+        low, high = _range(found, wanted)
+        responses = frequency_response_document(loop, response_frequencies(found, low, high, wanted.count))
+    return answer(request, encode(document | responses))
 
 
-def _range(found: ComplexArray, wanted: WantedResponses) -> tuple[float, float]:
-    """First and last frequency [rad/s].
+def _range(found: ComplexArray, wanted: WantedResponses, fastest: float = np.inf) -> tuple[float, float]:
+    """First and last frequency [rad/s]; where neither is given, none above `fastest`.
 
     Raises
     ------
-    InvalidRequest : the first is not below the last
+    InvalidRequest : the first is not below the last, or the last is above `fastest`
     """
     size = np.abs(found)[np.abs(found) > 0.0]
-    slowest, fastest = (float(size.min()), float(size.max())) if size.size else (1.0, 1.0)
+    slowest, quickest = (float(size.min()), float(size.max())) if size.size else (1.0, 1.0)
     low = wanted.from_ or 10.0 ** np.floor(np.log10(slowest) - 1.0)
-    high = wanted.to or 10.0 ** np.ceil(np.log10(fastest) + 0.5)
+    high = wanted.to or min(10.0 ** np.ceil(np.log10(quickest) + 0.5), fastest)
+    if high > fastest:
+        detail = f"the last frequency, {high:g} rad/s, is above half the sampling rate"
+        raise InvalidRequest(f"/to: {detail}", FieldRefusal("/to", detail, "rad/s", f"<= {fastest:.9g}"))
     if not low < high:
         detail = f"the first frequency, {low:g} rad/s, is not below the last, {high:g} rad/s"
         raise InvalidRequest(f"/from: {detail}", FieldRefusal("/from", detail, "rad/s", f"< {high:g}"))

@@ -32,5 +32,5 @@ def read_point(
     if not 0 <= index < size:
         raise NotFound(f"there is no point {index}; the grid has points 0 to {size - 1}")
     here = grid_index(envelope.plant.grid, index)
-    controllers = [controller_document(controller, here) for controller in envelope.controllers]
+    controllers = [controller_document(envelope, controller, here) for controller in envelope.controllers]
     return answer(request, encode(plant_document(envelope.plant, index) | {"controllers": controllers}))

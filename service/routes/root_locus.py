@@ -11,7 +11,7 @@ from design.frequency.loci import root_locus
 from design.frequency.locus_damping import gain_at_damping
 from design.loop import Loop, SisoLoop
 from service.answering import answer, encode
-from service.designs import controller_of, point_with_gains
+from service.designs import continuous_loop, controller_of, point_with_gains
 from service.limits import check_size
 from service.openapi import problems
 from service.presenters.root_locus import root_locus_document
@@ -56,8 +56,9 @@ def root_locus_of_controller(
     envelope = designs.envelope(ident)
     controller = controller_of(envelope, name)
     index = point_with_gains(envelope, controller, wanted.point)
-    loop = _loop(controller.loop.take(index), wanted.loop)
-    document = {"name": name, "loop": loop.name, "loops": _loop_names(controller.loop), "point": wanted.point}
+    whole = continuous_loop(controller)
+    loop = _loop(whole.take(index), wanted.loop)
+    document = {"name": name, "loop": loop.name, "loops": _loop_names(whole), "point": wanted.point}
     locus, damped = root_locus(loop, count=wanted.count), gain_at_damping(loop, wanted.damping_ratio)
     return answer(request, encode(document | root_locus_document(locus, damped, wanted.damping_ratio)))
 

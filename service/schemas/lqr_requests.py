@@ -95,7 +95,7 @@ class Lqr(AnyController):
     )
     measurement: Measurement | None = Field(
         default=None,
-        description="What the states are worked out from. This version takes null only: every state is measured",
+        description="What the states are worked out from, in continuous time; null: every state is measured",
     )
 
     @model_validator(mode="after")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from service.schemas.design import EnvelopeWarning, Grid, GridAir, GridOutcomes, GridReasons, Kind, OutcomeCode
@@ -161,11 +163,65 @@ class Step(Answer):
 
 
 class Riccati(Answer):
-    """Certificate of the optimal gains: residual, closed loop, and ``|1 + L|`` which is at least 1."""
+    """Certificate of the optimal gains: residual, closed loop of the design, and its return difference.
+
+    The return difference of a continuous design is ``R^1/2 (I + L) R^-1/2`` of all states, at least 1. Nothing keeps
+    that of a sampled one at 1: there it is the smallest ``|1 + L|`` of the loops cut one at a time. The spectral radius
+    is that of a sampled design, else null.
+    """
 
     residual: float
     largest_real_part: float = Field(json_schema_extra={"unit": "1/s"})
     return_difference_min: float
+    spectral_radius: float | None
+
+
+class SignalRms(Answer):
+    """Root mean square of a signal; null where it is unlimited."""
+
+    signal: str
+    unit: str
+    value: float | None = Field(json_schema_extra={"unit": "see `unit`"})
+
+
+class EstimateError(Answer):
+    """Root mean square of the error of an estimate, under the noise that the filter believes in."""
+
+    state: str
+    unit: str
+    value: float = Field(json_schema_extra={"unit": "see `unit`"})
+
+
+class KalmanFilter(Answer):
+    """Poles and errors of the filter, and the residual of its Riccati equation."""
+
+    poles: list[Complex]
+    residual: float
+    error_rms: list[EstimateError]
+
+
+class FedBack(Answer):
+    """Figures of a loop: with all states fed back, or as it is implemented.
+
+    The root mean squares are those under the request's torque noises and errors of the measured angles; null with
+    rate filters, which know no noise.
+    """
+
+    margins: dict[str, Margins]
+    return_difference_min: dict[str, float | None] = Field(description="Smallest |1 + L| at each cut, at most 1")
+    damping_ratio: float
+    settling_time_s: float | None
+    disturbance_rms: list[SignalRms] | None
+    noise_rms: list[SignalRms] | None
+
+
+class Estimation(Answer):
+    """What it costs that not all states are measured: the loop that is implemented beside the full-state feedback."""
+
+    kind: Literal["rate_filters", "kalman"]
+    filter: KalmanFilter | None = Field(description="null with rate filters")
+    full_state: FedBack
+    implemented: FedBack
 
 
 class PointVerdict(Answer):
@@ -249,8 +305,9 @@ class PointController(Answer):
     poles: list[Complex] | None
     margins: dict[str, Margins] | None
     step: Step | None
-    disturbance: list[DisturbancePair] | None
+    disturbance: list[DisturbancePair] | None = Field(description="null for a sampled state feedback")
     riccati: Riccati | None
+    estimation: Estimation | None = Field(description="null where every state is measured")
     verdicts: list[PointVerdict]
 
 

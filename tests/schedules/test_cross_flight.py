@@ -89,7 +89,7 @@ def test_against_the_assessment_of_each_pair_alone(study, plant, lqr, kind):
         for j in [(0, 0), (1, 3), (0, 2)]:
             model = plant.model.take(j)
             if kind == "lqr":
-                loop = lqr_loop(model, replace(lqr.riccati.take(i), outcomes=Outcomes.all_ok(())))
+                loop = lqr_loop(model, replace(lqr.optimum.take(i), outcomes=Outcomes.all_ok(())))
             else:
                 gains = {gain.name: gain.values[i] for gain in designed.gains}
                 loop = tab_loop(model, plant.servo_tab.take(j), study.tab_actuator, NF, gains)
@@ -123,7 +123,7 @@ def test_state_feedback_flies_with_its_lags_delays_and_references(study, plant, 
     request = replace(lqr.request, weights=bryson, reference=reference, delay_states=1)
     found = design_lqr(plant.model, request, plant.outcomes, *actuators)
     loop = lqr_loop(plant.model, found)
-    designed = replace(lqr, request=request, outcomes=found.outcomes, loop=loop, riccati=found, gains=())
+    designed = replace(lqr, request=request, outcomes=found.outcomes, loop=loop, optimum=found, gains=())
     assert found.outcomes.ok.all()
     got = cross_flight(study, plant, designed).figures
     step = np.array([study.reference.aileron, 0.0])[: len(loop.references)]
@@ -255,7 +255,7 @@ def test_the_sign_of_the_law_is_that_of_the_design(study, plant):
 
 def test_scaling_laws_can_be_flown_too(study, plant, lqr):
     flown = scaling_law(study, plant, lqr).flown
-    assert flown.riccati is None
+    assert flown.optimum is None
     found = cross_flight(study, plant, flown, steps=False)
     for i in [(0, 0), (1, 3)]:
         np.testing.assert_allclose(found.figures.damping_ratio[i + i], flown.assessment.damping_ratio[i], rtol=1e-12)

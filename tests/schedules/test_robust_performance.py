@@ -72,7 +72,7 @@ def test_against_studies_made_anew(study, plant, designs, kind):
         for i in [(0, 0), (1, 3)]:
             model = fresh.model.take(i)
             if kind == "lqr":
-                loop = lqr_loop(model, replace(designed.riccati.take(i), outcomes=Outcomes.all_ok(())))
+                loop = lqr_loop(model, replace(designed.optimum.take(i), outcomes=Outcomes.all_ok(())))
             else:
                 gains = {gain.name: gain.values[i] for gain in designed.gains}
                 loop = tab_loop(model, fresh.servo_tab.take(i), study.tab_actuator, designed.request, gains)
@@ -350,7 +350,7 @@ def test_unsteady_air_is_flown(study):
     names = cases.parameters
     for d in range(2):
         fresh = _anew(unsteady, dict(zip(names, cases.factors[d], strict=True)))
-        loop = lqr_loop(fresh.model, designed.riccati)
+        loop = lqr_loop(fresh.model, designed.optimum)
         np.testing.assert_allclose(
             found.figures.largest_real_part[..., d], np.linalg.eigvals(loop.closed).real.max(axis=-1), rtol=1e-10
         )

@@ -7,10 +7,8 @@ import pytest
 
 from design.classical.controller import ClassicalController
 from design.gains import Gain
-from design.lqr.measurement import RateFilters
 from design.lqr.weights import ExplicitWeights
 from design.outcome import Outcome
-from design.sampling import Sampling
 from design.specs import Spec
 from schedules.designed import ControllerRefused
 from schedules.run import run
@@ -126,13 +124,6 @@ def test_weights_that_cannot_work_are_refused(wind_tunnel_study):
         run(replace(wind_tunnel_study, controllers=(bad,)))
     assert error.value.controller == "lqr"
     assert error.value.refused.matrix == "R"
-
-
-def test_what_samples_or_estimates_is_refused_rather_than_left_out(wind_tunnel_study):
-    lqr = wind_tunnel_study.controllers[2]
-    for asked in (replace(lqr, sampling=Sampling(0.001, 0.001)), replace(lqr, measurement=RateFilters(500.0))):
-        with pytest.raises(ValueError, match="in continuous time"):
-            run(replace(wind_tunnel_study, controllers=(asked,)))
 
 
 def test_a_point_that_cannot_be_judged_is_withdrawn_alone(wind_tunnel_study, monkeypatch):

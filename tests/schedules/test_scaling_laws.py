@@ -25,7 +25,7 @@ def _judge(study, plant, request, gains, outcomes=None):
     """A controller of given gains by name, judged."""
     loop = tab_loop(plant.model, plant.servo_tab, study.tab_actuator, request, gains)
     named = tuple(Gain(name, request.gain_units[name], gains[name]) for name in request.gain_units)
-    return judged(study, plant, request, outcomes or Outcomes.all_ok(plant.grid.shape), named, loop, None)
+    return judged(study, plant, request, outcomes or Outcomes.all_ok(plant.grid.shape), named, loop)
 
 
 @pytest.fixture(scope="module", params=["negative_feedback", "positive_feedback"])

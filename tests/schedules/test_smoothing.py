@@ -79,7 +79,7 @@ def test_every_point_judged_again_meets_its_specs_and_keeps_its_bandwidth(table,
     found = smoothed[part]
     gains = {g.name: g.values for g in found.gains}
     loop = tab_loop(plant.model, plant.servo_tab, study.tab_actuator, designed.request, gains)
-    again = judged(study, plant, designed.request, designed.outcomes, found.gains, loop, None)
+    again = judged(study, plant, designed.request, designed.outcomes, found.gains, loop)
     assert again.outcomes.ok.all()
     asked = [v for v in again.verdicts if v.spec.source == "request"]
     assert len(asked) == 5
@@ -251,7 +251,7 @@ def test_four_gains_of_a_tab_commanded_by_its_rate(wind_tunnel_study):
     request = ClassicalController("rate", "negative_feedback", specs, tab_command="rate")
     loop = tab_loop(plant.model, plant.servo_tab, study.tab_actuator, request, gains)
     named = tuple(Gain(name, unit, gains[name]) for name, unit in request.gain_units.items())
-    designed = judged(study, plant, request, Outcomes.all_ok(plant.grid.shape), named, loop, None)
+    designed = judged(study, plant, request, Outcomes.all_ok(plant.grid.shape), named, loop)
     assert designed.outcomes.ok.all()
     found = _smooth((study, plant, designed), 0.1)
     assert _rms(found.after) < 0.1 * _rms(found.before)
