@@ -13,6 +13,7 @@ from design.loop import Loop
 from design.lqr.coded_loop import CodedLoop
 from design.lqr.flown import flown_loop
 from design.lqr.measurement import RateFilters
+from design.sampling import as_if_continuous
 from model.arrays import IntArray
 from model.linear_model import LinearModel
 from model.servo_tab import servo_tab
@@ -46,7 +47,7 @@ def carried_loop(
         # Of the servo tab's own gain the loop takes the sign only.
         servo = replace(servo_tab(model), dc_gain=plant.servo_tab.dc_gain[at])
         gains = {gain.name: gain.values[at] for gain in designed.gains}
-        return tab_loop(model, servo, study.tab_actuator, request, gains)
+        return as_if_continuous(tab_loop(model, servo, study.tab_actuator, request, gains), request.sampling)
     if designed.optimum is None:
         structure = request.structure(study.tab_actuator, study.aileron_actuator)
     else:

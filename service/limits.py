@@ -30,6 +30,8 @@ LIMITS = {
     "max_table_rows": "1",
     "max_map_cells": "1",
     "max_sweep_models": "1",
+    "max_flown_loops": "1",
+    "max_delayed_loops": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
 }

@@ -34,6 +34,12 @@ class Settings(BaseSettings):
     )
     max_map_cells: int = Field(default=50_000, ge=1, description="Grid points times cells of a steady-state map")
     max_sweep_models: int = Field(default=5000, ge=1, description="Grid points times values of an eigenvalue sweep")
+    max_flown_loops: int = Field(
+        default=50_000,
+        ge=1,
+        description="Loops flown away from their design: pairs of points, or grid points times perturbed plants",
+    )
+    max_delayed_loops: int = Field(default=2000, ge=1, description="The same, of controllers with transport delays")
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

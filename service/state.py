@@ -41,6 +41,12 @@ async def slot(request: Request) -> AsyncIterator[None]:
         yield
 
 
+async def own_slot(request: Request) -> AsyncIterator[None]:
+    """A place among the computations that run at the same time, be the design ready in memory or not."""
+    async with state_of(request).slots:
+        yield
+
+
 def settings_of(request: Request) -> Settings:
     """Settings of the app that serves this request."""
     return state_of(request).settings
@@ -55,3 +61,5 @@ SettingsHere = Annotated[Settings, Depends(settings_of)]
 DesignsHere = Annotated[Designs, Depends(designs_of)]
 #: In the `dependencies` of every route that computes.
 HEAVY = Depends(slot, scope="function")
+#: The same for routes that compute much, the design being ready or not.
+ALWAYS_HEAVY = Depends(own_slot, scope="function")

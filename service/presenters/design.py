@@ -106,6 +106,8 @@ def links(ident: str, controllers: list[str]) -> dict[str, Any]:
         "verdicts": each("verdicts"),
         "design_margin": each("design-margin"),
         "scaling": each("scaling"),
+        "cross_flight": each("cross-flight"),
+        "robust_performance": each("robust-performance"),
         "gains": each("gains"),
         "schedules": {
             name: {suffix: f"{here}/schedules/{name}.{suffix}" for suffix in FILE_FORMATS} for name in controllers

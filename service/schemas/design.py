@@ -137,6 +137,8 @@ class Links(Answer):
     verdicts: dict[str, str]
     design_margin: dict[str, str]
     scaling: dict[str, str]
+    cross_flight: dict[str, str]
+    robust_performance: dict[str, str]
     gains: dict[str, str]
     schedules: dict[str, dict[str, str]]
 

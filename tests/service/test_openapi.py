@@ -62,6 +62,8 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/response"),
         ("get", "/v1/designs/{id}/controllers/{name}/actuator-requirements"),
         ("get", "/v1/designs/{id}/controllers/{name}/frequency-response"),
+        ("get", "/v1/designs/{id}/controllers/{name}/cross-flight"),
+        ("get", "/v1/designs/{id}/controllers/{name}/robust-performance"),
         ("get", "/v1/designs/{id}/controllers/{name}/verdicts"),
         ("get", "/v1/designs/{id}/controllers/{name}/design-margin"),
         ("get", "/v1/designs/{id}/controllers/{name}/scaling"),
@@ -124,7 +126,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 24
+    assert checked == 26
 
 
 def test_every_error_is_declared_with_its_shape(document: dict[str, Any]) -> None:
