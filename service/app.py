@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import cache
 
 from anyio import Semaphore
 from fastapi import FastAPI
 
 from service import errors, openapi, pages
 from service.body_limit import BodyLimit
+from service.design_examples import design_requests
 from service.designs import Designs, design_id
-from service.examples import NAMES, example
+from service.examples import NAMES
 from service.head_requests import HeadRequests
 from service.routes import ROUTERS
 from service.schemas.requests import DesignRequest
@@ -50,12 +52,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.include_router(router)
     pages.install(app)
     errors.install(app)
-    openapi.install(app, example_id)
+    openapi.install(app, NAMES[0], example_id)
     app.add_middleware(BodyLimit, limit=chosen.max_body_bytes)
     app.add_middleware(HeadRequests)
     return app
 
 
-def example_id() -> str:
-    """Id that the design of the first shipped example gets from this code."""
-    return design_id(DesignRequest.model_validate(example(NAMES[0])))
+@cache
+def example_id(name: str) -> str:
+    """Id that the design of the example of this name gets from this code."""
+    return design_id(DesignRequest.model_validate(design_requests()[name][1]))

@@ -29,7 +29,7 @@ from service.envelopes import Envelopes
 from service.limits import check_envelope
 from service.presenters.design import design_document
 from service.presenters.grid import grid_index
-from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound, NotOffered, StaleDesign
+from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound, StaleDesign, StudyNotPossible
 from service.schemas.requests import DesignRequest, LinearModelsRequest
 from service.store import DesignStore, ListedDesign, StoredDesign
 from service.version import code_version
@@ -230,10 +230,12 @@ def continuous_loop(controller: DesignedController) -> Loop:
 
     Raises
     ------
-    NotOffered : a sampled state feedback, which has none
+    StudyNotPossible : a sampled state feedback, which has none
     """
     if isinstance(controller.loop, CodedLoop):
-        raise NotOffered(f"the controller {controller.request.name} is a sampled state feedback, which runs as code")
+        raise StudyNotPossible(
+            f"the controller {controller.request.name} is a sampled state feedback, which runs as code"
+        )
     return controller.loop
 
 
@@ -242,12 +244,12 @@ def measuring_all(controller: DesignedController) -> None:
 
     Raises
     ------
-    NotOffered
+    StudyNotPossible
     """
     continuous_loop(controller)
     request = controller.request
     if isinstance(request, LqrController) and request.measurement is not None:
-        raise NotOffered(f"the controller {request.name} does not measure all its states")
+        raise StudyNotPossible(f"the controller {request.name} does not measure all its states")
 
 
 def point_with_gains(envelope: DesignedEnvelope, controller: DesignedController, point: int) -> tuple[int, ...]:

@@ -26,7 +26,7 @@ STATUS: dict[type[Exception], tuple[int, str, str]] = {
     refusals.UnreadableBody: (400, "unreadable_body", "The body cannot be read"),
     refusals.NotFound: (404, "not_found", "There is no such thing here"),
     refusals.NoDesignAtPoint: (409, "no_design_at_point", "The controller has no gains at this point"),
-    refusals.NotOffered: (409, "not_offered", "This is not answered for such a controller"),
+    refusals.StudyNotPossible: (409, "study_not_possible", "The study is not possible for this controller"),
     refusals.StaleDesign: (409, "stale_design", "The design was made by another version"),
     refusals.BodyTooLarge: (413, "body_too_large", "The body is too large"),
     refusals.UnsupportedMediaType: (415, "unsupported_media_type", "The body is not declared as JSON"),

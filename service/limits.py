@@ -32,6 +32,8 @@ LIMITS = {
     "max_sweep_models": "1",
     "max_flown_loops": "1",
     "max_delayed_loops": "1",
+    "max_swept_samples": "1",
+    "max_step_samples": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
 }

@@ -18,6 +18,8 @@ from service.units import state_units
 #: What a route that reads a body may refuse it for.
 BODY = (400, 413, 415, 422)
 _PROBLEM = {"$ref": "#/components/schemas/Problem"}
+#: Where an operation keeps the name of the design request that it is shown with, until the document is complete.
+_EXAMPLE = "x-example"
 _FIELD = FieldRefusal("/geometry/chord_m", "must be greater than or equal to 0.001", "m", ">= 0.001 and <= 100")
 _DETAILS = {
     400: "the body is not JSON: Expecting ',' delimiter at line 3, column 1",
@@ -44,6 +46,11 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return {status: _documented(status) for status in statuses}
 
 
+def shown_with(example: str) -> dict[str, Any]:
+    """The `openapi_extra` of a route below a design that is shown with another example than the first."""
+    return {_EXAMPLE: example}
+
+
 def _documented(status: int) -> dict[str, Any]:
     titles = {code: title for number, code, title in STATUS.values() if number == status}
     code, title = next(iter(titles.items()))
@@ -54,8 +61,11 @@ def _documented(status: int) -> dict[str, Any]:
     }
 
 
-def install(app: FastAPI, example_id: Callable[[], str]) -> None:
-    """Complete the document of the app; `example_id` is the id that the example `wind_tunnel` gets."""
+def install(app: FastAPI, first_example: str, example_id: Callable[[str], str]) -> None:
+    """Complete the document of the app; `example_id` is the id that the design request of an example gets.
+
+    Routes below a design are shown with the first example, or the one that `shown_with` says.
+    """
     plain = app.openapi
 
     def openapi() -> dict[str, Any]:
@@ -71,7 +81,7 @@ def install(app: FastAPI, example_id: Callable[[], str]) -> None:
                 schemas.pop(unused, None)
             for path, operations in document["paths"].items():
                 for method, operation in operations.items():
-                    _complete(path, method, operation, example_id())
+                    _complete(path, method, operation, example_id(operation.pop(_EXAMPLE, first_example)))
         return app.openapi_schema or {}
 
     app.openapi = openapi  # type: ignore[method-assign]

@@ -60,8 +60,8 @@ class NoDesignAtPoint(Refusal):
     """The controller has no gains at that grid point; the detail says why."""
 
 
-class NotOffered(Refusal):
-    """The question makes no sense, or is not answered, for a controller of this kind; the detail says why."""
+class StudyNotPossible(Refusal):
+    """The study is not of this kind of controller, or the domain refuses it; the detail says why."""
 
 
 class StaleDesign(Refusal):

@@ -40,6 +40,15 @@ class Settings(BaseSettings):
         description="Loops flown away from their design: pairs of points, or grid points times perturbed plants",
     )
     max_delayed_loops: int = Field(default=2000, ge=1, description="The same, of controllers with transport delays")
+    max_swept_samples: int = Field(
+        default=500_000,
+        ge=1,
+        description="Samples that a sweep of sample times scans: of a step at every grid point and sample time, each "
+        "counted as often as the fastest mode of the plant needs a finer mesh there",
+    )
+    max_step_samples: int = Field(
+        default=20_000, ge=1, description="The same, of the step at one grid point and sample time"
+    )
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

@@ -10,6 +10,7 @@ from design.lqr.controller import LqrController
 from design.lqr.flown import flown_loop
 from design.lqr.power_figures import PowerFigures, power_figures, step_of
 from design.lqr.power_weights import NetWorkWeights, PowerBalancedWeights, ReferenceStep
+from design.lqr.retuning import Retuning
 from design.lqr.synthesis import LqrDesign, design_lqr
 from design.outcome import Outcomes
 from model.actuators import Actuator
@@ -49,11 +50,13 @@ class PowerComparison(GridArrays):
     Attributes
     ----------
     before, after : without power weighting, and with it, at the same settling time
+    retuning : (*G) factors on the weights with power weighting, that keep the settling time
     outcomes : (*G,) of the design with power weighting
     """
 
     before: PoweredStep
     after: PoweredStep
+    retuning: Retuning
     outcomes: Outcomes
 
     @property
@@ -92,9 +95,10 @@ def power_comparison(
         raise ValueError("a comparison needs weights that weigh power, and a step on which it is judged")
     plain = design_lqr(model, replace(controller, weights=weights.base), outcomes, tab, aileron)
     weighed = design_lqr(model, replace(controller, weights=weights), outcomes, tab, aileron)
-    return PowerComparison(
-        _response(model, plain, step, samples), _response(model, weighed, step, samples), weighed.outcomes
-    )
+    if weighed.retuning is None:
+        raise ValueError("weights that keep the settling time have no factors")
+    before, after = (_response(model, design, step, samples) for design in (plain, weighed))
+    return PowerComparison(before, after, weighed.retuning, weighed.outcomes)
 
 
 def _response(model: LinearModel, design: LqrDesign, step: ReferenceStep, samples: int) -> PoweredStep:

@@ -13,6 +13,7 @@ from design.lqr.controller import LqrController
 from design.lqr.sampled_assessment import assess_sampled
 from design.lqr.sampled_design import design_lqr_sampled, emulated_lqr_loop, sampled_lqr_loop
 from design.lqr.synthesis import LqrDesign
+from design.lqr.weights import WeightsRefused
 from design.sampling import Sampling
 from design.specs import QUANTITIES, Spec
 from model.actuators import Actuator
@@ -87,9 +88,12 @@ class Question:
         """The trial of one sample time [s] at every point."""
         sampling = Sampling(time, self.computation * time)
         if way == "redesigned":
-            design = design_lqr_sampled(
-                self.model, self.controller, sampling, None, self.tab, self.aileron, self.continuous.retuning
-            )
+            try:
+                design = design_lqr_sampled(
+                    self.model, self.controller, sampling, None, self.tab, self.aileron, self.continuous.retuning
+                )
+            except WeightsRefused as refused:  # a sample time that loses a mode at every point is one that fails
+                return self._failed(str(refused))
             outcomes, loop = design.outcomes, sampled_lqr_loop(self.model, design)
         else:
             outcomes, loop = self.continuous.outcomes, emulated_lqr_loop(self.model, self.continuous, sampling)
@@ -110,6 +114,13 @@ class Question:
             )
             reasons[index] = "; ".join(missed)
         return Trial(figures, met, passed, reasons)
+
+    def _failed(self, reason: str) -> Trial:
+        """A trial that comes to nothing at any point."""
+        grid = self.model.A.shape[:-2]
+        nothing = np.full((*grid, len(self.figures)), np.nan)
+        unmet = np.zeros((*grid, len(self.specs)), dtype=bool)
+        return Trial(nothing, unmet, np.zeros(grid, dtype=bool), np.full(grid, reason, dtype=object))
 
     def _stable(self, loop: CodedLoop, ok: BoolArray, figures: FloatArray, reasons: ObjectArray) -> BoolArray:
         """Mask (*G,) of the points with a stable loop; their spectral radii, and why the others are not."""

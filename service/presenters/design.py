@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ def design_document(ident: str, request: dict[str, Any], created_at: str, envelo
         "warnings": warning_documents(envelope.warnings),
         "hinge_moment_fit": fit_document(plant.system.aerodynamics.source),
         "controllers": [_controller(controller, plant.grid.axes) for controller in envelope.controllers],
-        "links": links(ident, [controller.request.name for controller in envelope.controllers]),
+        "links": links(ident, {one.request.name: one.request.kind for one in envelope.controllers}),
     }
 
 
@@ -89,12 +90,12 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def links(ident: str, controllers: list[str]) -> dict[str, Any]:
-    """Addresses of what belongs to a design, by controller where there is one."""
+def links(ident: str, controllers: dict[str, str]) -> dict[str, Any]:
+    """Addresses of what belongs to a design, by controller where there is one; `controllers` are kinds by name."""
     here = f"/v1/designs/{ident}"
 
-    def each(what: str) -> dict[str, str]:
-        return {name: f"{here}/controllers/{name}/{what}" for name in controllers}
+    def each(what: str, kinds: Container[str] = controllers.values()) -> dict[str, str]:
+        return {name: f"{here}/controllers/{name}/{what}" for name, kind in controllers.items() if kind in kinds}
 
     return {
         "self": here,
@@ -104,10 +105,15 @@ def links(ident: str, controllers: list[str]) -> dict[str, Any]:
         "frequency_response": each("frequency-response"),
         "actuator_requirements": each("actuator-requirements"),
         "verdicts": each("verdicts"),
-        "design_margin": each("design-margin"),
+        "design_margin": each("design-margin", ("negative_feedback", "positive_feedback")),
         "scaling": each("scaling"),
         "cross_flight": each("cross-flight"),
         "robust_performance": each("robust-performance"),
+        "simultaneous_margins": each("simultaneous-margins", ("lqr",)),
+        "norms": each("norms", ("lqr",)),
+        "phase_plane": each("phase-plane", ("lqr",)),
+        "power_comparison": each("power-comparison", ("lqr",)),
+        "sample_time_sweep": each("sample-time-sweep", ("lqr",)),
         "gains": each("gains"),
         "schedules": {
             name: {suffix: f"{here}/schedules/{name}.{suffix}" for suffix in FILE_FORMATS} for name in controllers

@@ -20,7 +20,7 @@ from service.designs import continuous_loop, controller_of
 from service.limits import check_size
 from service.openapi import problems
 from service.presenters.cross_flight import cross_flight_document
-from service.refusals import InvalidRequest, NotOffered
+from service.refusals import InvalidRequest, StudyNotPossible
 from service.routes.controllers import ControllerName
 from service.routes.designs import DesignId
 from service.schemas.robustness_answers import CrossFlight
@@ -83,12 +83,12 @@ def carried_controller(envelope: DesignedEnvelope, name: str) -> DesignedControl
     Raises
     ------
     NotFound
-    NotOffered : a sampled state feedback, or one that runs a model of its own point
+    StudyNotPossible : a sampled state feedback, or one that runs a model of its own point
     """
     controller = controller_of(envelope, name)
     continuous_loop(controller)
     if controller.observer is not None:
-        raise NotOffered(f"the controller {name} estimates states by a model of its own point")
+        raise StudyNotPossible(f"the controller {name} estimates states by a model of its own point")
     return controller
 
 

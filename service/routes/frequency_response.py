@@ -70,16 +70,16 @@ def frequency_response_of_controller(
     if isinstance(loop, CodedLoop):
         found = sampled_poles(loop.closed, loop.sampling.time, max(loop.waiting, default=0)).equivalent
         found = found[np.isfinite(found)]
-        low, high = _range(found, wanted, fastest=float(np.pi / loop.sampling.time))
+        low, high = frequency_range(found, wanted, fastest=float(np.pi / loop.sampling.time))
         responses = coded_responses_document(loop, response_frequencies(found, low, high, wanted.count))
     else:
         found = poles(loop.closed)
-        low, high = _range(found, wanted)
+        low, high = frequency_range(found, wanted)
         responses = frequency_response_document(loop, response_frequencies(found, low, high, wanted.count))
     return answer(request, encode(document | responses))
 
 
-def _range(found: ComplexArray, wanted: WantedResponses, fastest: float = np.inf) -> tuple[float, float]:
+def frequency_range(found: ComplexArray, wanted: WantedResponses, fastest: float = np.inf) -> tuple[float, float]:
     """First and last frequency [rad/s]; where neither is given, none above `fastest`.
 
     Raises

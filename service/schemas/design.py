@@ -139,6 +139,11 @@ class Links(Answer):
     scaling: dict[str, str]
     cross_flight: dict[str, str]
     robust_performance: dict[str, str]
+    simultaneous_margins: dict[str, str] = Field(description="This and the four below: of state feedback")
+    norms: dict[str, str]
+    phase_plane: dict[str, str]
+    power_comparison: dict[str, str]
+    sample_time_sweep: dict[str, str]
     gains: dict[str, str]
     schedules: dict[str, dict[str, str]]
 

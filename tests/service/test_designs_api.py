@@ -183,14 +183,28 @@ def test_unknown_design(client: TestClient, refused: Any, ident: str) -> None:
 
 
 def test_links_lead_somewhere(client: TestClient, design: dict[str, Any]) -> None:
+    """Every link, of the controllers that it is of; weights without regard to power have no before and after."""
     links = design["links"]
-    paths = [links["self"], links["points"].format(index=0)]
-    for name in ("nf", "pf", "lqr"):
-        paths += [links["root_locus"][name] + "?point=0", links["response"][name] + "?point=0"]
-        paths += [links["actuator_requirements"][name], *links["schedules"][name].values()]
-        paths += [links["gains"][name] + "?altitude_m=0&dynamic_pressure_pa=500"]
-    for path in paths:
-        assert client.get(path).status_code == 200, path
+    queries = dict.fromkeys(
+        ("root_locus", "response", "frequency_response", "simultaneous_margins", "norms", "phase_plane"), "?point=0"
+    )
+    queries |= {
+        "gains": "?altitude_m=0&dynamic_pressure_pa=500",
+        "sample_time_sweep": "?from_s=0.001&to_s=0.002&count=2",
+    }
+    followed = [links["self"], links["points"].format(index=0)]
+    followed += [path for files in links["schedules"].values() for path in files.values()]
+    for what, addresses in links.items():
+        if what in ("self", "points", "schedules", "power_comparison"):
+            continue
+        assert set(addresses) <= {"nf", "pf", "lqr"}
+        followed += [path + queries.get(what, "") for path in addresses.values()]
+    for path in followed:
+        response = client.get(path)
+        assert response.status_code == 200, (path, response.text)
+    assert set(links["norms"]) == {"lqr"}
+    assert set(links["design_margin"]) == {"nf", "pf"}
+    assert client.get(links["power_comparison"]["lqr"]).json()["code"] == "study_not_possible"
 
 
 def test_names_in_any_script(client: TestClient, quick: Any) -> None:

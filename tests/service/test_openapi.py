@@ -12,6 +12,7 @@ from fastapi.routing import APIRoute
 from fastapi.testclient import TestClient
 from pydantic import TypeAdapter
 
+from service.design_examples import design_requests
 from service.errors import STATUS
 from service.routes import ROUTERS
 from service.schemas.problem import Problem
@@ -23,6 +24,14 @@ METHODS = ("get", "post")
 def document(client: TestClient) -> dict[str, Any]:
     openapi: dict[str, Any] = client.get("/openapi.json").json()
     return openapi
+
+
+@pytest.fixture(scope="module")
+def shown(client: TestClient, design: dict[str, Any]) -> list[str]:
+    """Ids of the designs that routes are shown with: the first example, and one that weighs power."""
+    response = client.post("/v1/designs", json=design_requests()["lqr_power"][1])
+    assert response.status_code in (200, 201), response.text
+    return [design["id"], response.json()["id"]]
 
 
 def operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
@@ -64,6 +73,11 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/frequency-response"),
         ("get", "/v1/designs/{id}/controllers/{name}/cross-flight"),
         ("get", "/v1/designs/{id}/controllers/{name}/robust-performance"),
+        ("get", "/v1/designs/{id}/controllers/{name}/simultaneous-margins"),
+        ("get", "/v1/designs/{id}/controllers/{name}/norms"),
+        ("get", "/v1/designs/{id}/controllers/{name}/phase-plane"),
+        ("get", "/v1/designs/{id}/controllers/{name}/power-comparison"),
+        ("get", "/v1/designs/{id}/controllers/{name}/sample-time-sweep"),
         ("get", "/v1/designs/{id}/controllers/{name}/verdicts"),
         ("get", "/v1/designs/{id}/controllers/{name}/design-margin"),
         ("get", "/v1/designs/{id}/controllers/{name}/scaling"),
@@ -97,9 +111,9 @@ def test_every_body_example_runs(client: TestClient, document: dict[str, Any]) -
     assert len(ran) == 24
 
 
-@pytest.mark.usefixtures("design")
+@pytest.mark.usefixtures("shown")
 def test_every_parameter_example_runs(client: TestClient, document: dict[str, Any]) -> None:
-    """With the example design posted, every GET of the document works as its examples say, names and all."""
+    """With the example designs posted, every GET of the document works as its examples say, names and all."""
     for path, method, operation in operations(document):
         if method == "get":
             where, query = address(path, operation)
@@ -109,7 +123,7 @@ def test_every_parameter_example_runs(client: TestClient, document: dict[str, An
             assert media in operation["responses"]["200"]["content"], (path, media)
 
 
-@pytest.mark.usefixtures("design")
+@pytest.mark.usefixtures("shown")
 def test_answers_are_what_their_models_say(client: TestClient, document: dict[str, Any]) -> None:
     """Every JSON answer has exactly the fields of its declared model."""
     routes = [route for router in ROUTERS for route in router.routes if isinstance(route, APIRoute)]
@@ -126,7 +140,21 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 26
+    assert checked == 31
+
+
+def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
+    document: dict[str, Any], shown: list[str]
+) -> None:
+    ids = {
+        path: [p["example"] for p in operation["parameters"] if p["name"] == "id"]
+        for path, method, operation in operations(document)
+        if "{id}" in path
+    }
+    power = "/v1/designs/{id}/controllers/{name}/power-comparison"
+    assert ids.pop(power) == [shown[1]]
+    assert set(map(tuple, ids.values())) == {(shown[0],)}
+    assert "x-example" not in json.dumps(document)
 
 
 def test_every_error_is_declared_with_its_shape(document: dict[str, Any]) -> None:

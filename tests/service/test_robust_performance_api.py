@@ -282,7 +282,7 @@ def test_controllers_that_run_a_model_of_their_point_are_refused(
     document = posted(client, one_point)
     for what in ("cross-flight", "robust-performance"):
         for name in ("sampled", "estimated"):
-            assert refused(client.get(address(document, name, what)), 409)["code"] == "not_offered"
+            assert refused(client.get(address(document, name, what)), 409)["code"] == "study_not_possible"
         answered(client, document, "filtered", what)
 
 

@@ -15,6 +15,7 @@ from design.lqr.sampled_assessment import assess_sampled
 from design.lqr.sampled_design import design_lqr_sampled, emulated_lqr_loop, sampled_lqr_loop
 from design.lqr.synthesis import design_lqr
 from design.lqr.torque_loop import lqr_loop
+from design.lqr.weights import ExplicitWeights
 from design.outcome import Outcome, Outcomes
 from design.sampling import Sampling, digital_loop
 from design.specs import Spec
@@ -267,3 +268,14 @@ def test_unbroken():
     passed = np.array([[1, 1, 0, 1, 1], [1, 0, 1, 0, 0], [0, 1, 1, 1, 1]], dtype=bool)
     wanted = np.array([[1, 1, 0, 0, 0], [1, 1, 1, 1, 0], [0, 0, 0, 0, 0]], dtype=bool)
     np.testing.assert_array_equal(unbroken(tried, passed), wanted)
+
+
+def test_a_sample_time_that_loses_a_mode_everywhere_is_one_that_fails():
+    """A regulator's plant that swings many times within a sample: no weights see it, and the sweep goes on."""
+    model, controller = example("wind_tunnel")
+    model = model.take((0, 3))
+    weights = ExplicitWeights(np.diag([33.0, 0.02, 820.0, 0.08]), np.diag([4.0, 0.25]), None)
+    regulator = replace(controller, reference="none", weights=weights)
+    sweep = sweep_sample_time(model, regulator, [1e-3, 4.9], (), np.zeros(0), 0.5)
+    assert sweep.redesigned.by_point.slowest >= 1e-3
+    assert sweep.redesigned.by_point.limited
