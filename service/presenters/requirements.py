@@ -20,6 +20,7 @@ _FIGURES = {
     "holding_torque_n_m": ("holding_torque", False),
     "peak_rate_deg_s": ("peak_rate", True),
     "peak_acceleration_deg_s2": ("peak_acceleration", True),
+    "rms_acceleration_deg_s2": ("rms_acceleration", True),
     "peak_deflection_deg": ("peak_deflection", True),
     "peak_power_w": ("peak_power", False),
     "rms_power_w": ("rms_power", False),

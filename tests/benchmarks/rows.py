@@ -29,6 +29,7 @@ from model.trim import TrimRequest, trim
 from schedules.run import run
 from tests.benchmarks import peers
 from tests.benchmarks.cases import DURATION, GAINS, SAMPLES, STEP, TAB_ACTUATOR, Case, case, tab_only
+from tests.benchmarks.manoeuvre_rows import manoeuvre_rows
 from tests.benchmarks.measure import Row
 
 
@@ -49,6 +50,7 @@ def rows() -> list[Row]:
         _all_margins(c),
         _steps(c),
         _refined_steps(c),
+        *manoeuvre_rows(c),
         _whole(c),
     ]
 
