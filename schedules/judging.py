@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from design.assess import Assessment, achieved, assess, verdicts
@@ -13,8 +15,11 @@ from design.loop import Loop
 from design.lqr.coded_loop import CodedLoop
 from design.lqr.sampled_assessment import assess_sampled
 from design.outcome import Outcome, Outcomes
+from design.response.manoeuvre_demand import manoeuvre_demands
+from design.response.manoeuvre_response import manoeuvre_response
 from design.sampling import Sampling, as_if_continuous
 from design.specs import Spec
+from model.actuators import ActuatorLimits
 from model.arrays import BoolArray, ComplexArray, FloatArray
 from model.reduced_frequency import reduced_frequency
 from schedules.analysis import PlantEnvelope
@@ -57,7 +62,7 @@ def judged(
         return DesignedController(request, outcomes, gains, loop, None, none.astype(complex), none, ())
     step, duration = study.reference.sizes(loop.references), horizon(study, request)
     try:
-        found = _assessed(request, loop.take(ok), step, duration).spread(ok)
+        found = _on_manoeuvre(study, loop.take(ok), _assessed(request, loop.take(ok), step, duration)).spread(ok)
         fastest = _fastest_mode(request, loop, ok)
         checked = _certify(outcomes, found, _steering(request), gains, plant)
     except np.linalg.LinAlgError as error:
@@ -86,6 +91,24 @@ def _assessed(request: Controller, loop: Loop | CodedLoop, step: FloatArray, dur
     if isinstance(loop, CodedLoop):
         return assess_sampled(loop, step, duration)
     return assess(loop, step, duration, sampling=_sampling(request))
+
+
+def _on_manoeuvre(study: Study, loop: Loop | CodedLoop, found: Assessment) -> Assessment:
+    """The assessment with the actuators' demands of the study's manoeuvre, where that is not the step itself.
+
+    Raises
+    ------
+    ValueError : a sampled state feedback, which is followed through steps at once only
+    """
+    if study.reference.rate_limit is None:
+        return found
+    if isinstance(loop, CodedLoop):
+        raise ValueError("a sampled state feedback is followed through a step at once, not at a limited rate")
+    flown = found.loop
+    response = manoeuvre_response(flown, study.reference.manoeuvre(flown.references), study.reference.duration, 2)
+    return replace(
+        found, demand=manoeuvre_demands(flown, response, flown.inputs, (ActuatorLimits(),) * len(flown.inputs))
+    )
 
 
 def _fastest_mode(request: Controller, loop: Loop | CodedLoop, ok: BoolArray) -> ComplexArray:

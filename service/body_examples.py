@@ -120,6 +120,40 @@ def _shown(summary: str, value: dict[str, Any]) -> dict[str, Any]:
 
 
 #: Path -> its examples, by name.
+def _requirements() -> Examples:
+    rate_limited = {
+        "manoeuvre": {"kind": "step", "aileron_deg": 10.0, "rate_limit_deg_s": 60.0}, "duration_s": 1.0,
+    }  # fmt: skip
+    simulated = {
+        "manoeuvre": {"kind": "doublet", "aileron_deg": 5.0, "length_s": 0.2},
+        "duration_s": 1.0,
+        "nonlinear": {"friction": {"aileron": {"static_n_m": 0.05, "kinetic_n_m": 0.04}}},
+    }
+    return {
+        "rate_limited_step": _shown("a step at a limited rate (seed Fig 5.20)", rate_limited),
+        "doublet_with_friction": _shown("a doublet, simulated too, with friction in the aileron's hinge", simulated),
+    }
+
+
+def _responses() -> Examples:
+    sine = {
+        "point": 3,
+        "manoeuvre": {"kind": "sine", "aileron_deg": 5.0, "frequency_hz": 2.0},
+        "duration_s": 2.0,
+        "samples": 201,
+    }
+    recorded = {
+        "point": 3,
+        "manoeuvre": {"kind": "recorded", "times_s": [0.0, 0.1, 0.3, 0.3], "aileron_deg": [0.0, 4.0, 4.0, -2.0]},
+        "duration_s": 1.0,
+        "samples": 201,
+    }
+    return {
+        "sine": _shown("a sine", sine),
+        "recorded": _shown("a recorded series, simulated with the actuators' limits", recorded | {"nonlinear": {}}),
+    }
+
+
 BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/designs": _designs,
     "/v1/hinge-moments": _hinge_moments,
@@ -127,4 +161,6 @@ BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/eigenvalue-sweeps": _eigenvalue_sweeps,
     "/v1/steady-state-maps": _steady_state_maps,
     "/v1/similarity": _similarity,
+    "/v1/designs/{id}/controllers/{name}/response": _responses,
+    "/v1/designs/{id}/controllers/{name}/actuator-requirements": _requirements,
 }

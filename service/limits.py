@@ -34,6 +34,8 @@ LIMITS = {
     "max_delayed_loops": "1",
     "max_swept_samples": "1",
     "max_step_samples": "1",
+    "max_flown_knots": "1",
+    "max_simulated_steps": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
 }

@@ -1,4 +1,4 @@
-"""From the wire to manoeuvres: the references of a loop as functions of time, in radians."""
+"""From the wire to manoeuvres and simulations of them: SI and radians."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ import numpy as np
 
 from design import manoeuvre as flown
 from design.manoeuvre import Manoeuvre
+from design.simulation.request import Freeplay, Friction, SimulationRequest
 from model.arrays import FloatArray
+from schedules.requirements import limits_by_name
+from schedules.study import Study
 from service.schemas import manoeuvres
+from service.schemas.requirement_requests import Nonlinear
 
 #: Reference of a loop -> the surface whose fields on the wire it takes.
 _SURFACES = {"r_a": "aileron", "r_t": "tab"}
@@ -30,6 +34,21 @@ def manoeuvre_of(wire: manoeuvres.Manoeuvre, references: tuple[str, ...]) -> Man
     if wire.rate_limit_deg_s is None:
         return flown.step(size)
     return flown.rate_limited_step(size, radians(wire.rate_limit_deg_s))
+
+
+def simulation_of(wire: Nonlinear, study: Study, duration: float, samples: int) -> SimulationRequest:
+    """A simulation, with the limits of the study's actuators unless it is to be without."""
+    hinges = {"tab": wire.friction.tab, "aileron": wire.friction.aileron}
+    friction = {
+        name: Friction(hinge.static_n_m, hinge.kinetic_n_m) for name, hinge in hinges.items() if hinge is not None
+    }
+    link = wire.freeplay
+    freeplay = None if link is None else Freeplay(radians(link.gap_deg), link.stiffness, link.damping)
+    limits = limits_by_name(study) if wire.limits else {}
+    return SimulationRequest(
+        duration, samples, wire.tolerance, limits=limits, friction=friction, freeplay=freeplay,
+        anti_windup=wire.anti_windup_1_s,
+    )  # fmt: skip
 
 
 def _sizes(wire: manoeuvres.Manoeuvre, references: tuple[str, ...], unit: str) -> FloatArray:

@@ -49,6 +49,14 @@ class Settings(BaseSettings):
     max_step_samples: int = Field(
         default=20_000, ge=1, description="The same, of the step at one grid point and sample time"
     )
+    max_flown_knots: int = Field(
+        default=100_000, ge=1, description="Grid points times knots of a manoeuvre whose requirements are asked for"
+    )
+    max_simulated_steps: int = Field(
+        default=5_000_000,
+        ge=1,
+        description="Steps of a non-linear simulation: of all points, and 100 times those of the point with most",
+    )
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

@@ -12,6 +12,8 @@ _INSIDE = {
     "dt_rate": "rad/s",
     "dt_command": "rad",
     "dt_rate_command": "rad/s",
+    "dt_actuator": "rad",
+    "dt_actuator_rate": "rad/s",
     "T_t": "N m",
     "T_a": "N m",
     "T_t_command": "N m",

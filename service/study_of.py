@@ -177,7 +177,12 @@ def limits(wire: actuators.Limits) -> ActuatorLimits:
 
 def reference(wire: flight.Reference) -> Reference:
     """The manoeuvre that actuators are judged on."""
-    return Reference(aileron=radians(wire.aileron_deg), duration=wire.duration_s, tab=radians(wire.tab_deg))
+    return Reference(
+        aileron=radians(wire.aileron_deg),
+        duration=wire.duration_s,
+        tab=radians(wire.tab_deg),
+        rate_limit=None if wire.rate_limit_deg_s is None else radians(wire.rate_limit_deg_s),
+    )
 
 
 def controller(wire: controller_requests.Controller, axes: GridAxes, step: flight.Reference) -> Controller:

@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 
 from design.lqr.sampled_response import SampledResponse
+from design.response.manoeuvre_response import ManoeuvreResponse
 from design.response.step_response import Response
+from design.simulation.response import NonlinearResponse
 from model.arrays import FloatArray
 from schedules.wire_names import wire_name
 from service.signal_units import signal_unit
 
 
-def response_document(response: Response) -> dict[str, Any]:
+def response_document(response: Response | ManoeuvreResponse | NonlinearResponse) -> dict[str, Any]:
     """Response at one point; totals, trim values included."""
     return _document(response.names, response.time, response.outputs)
 

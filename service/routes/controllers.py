@@ -2,56 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
 from design.classical.controller import ClassicalController
-from design.delay.step_response import delayed_step_response
-from design.lqr.coded_loop import CodedLoop
-from design.lqr.sampled_response import sampled_step_response
 from schedules.designed import DesignedEnvelope
 from schedules.interpolate import interpolate
 from schedules.run import design_margins
 from schedules.schedule_of import schedule_of
 from schedules.wire_names import axis_name
 from service.answering import answer, encode
-from service.designs import controller_of, measuring_all, point_with_gains
-from service.limits import check_size
+from service.designs import controller_of, measuring_all
 from service.openapi import problems
 from service.presenters.design_margin import design_margin_document
 from service.presenters.gains import gains_document
-from service.presenters.requirements import reference_document, requirements_document
-from service.presenters.response import response_document, sampled_response_document
 from service.presenters.scaling import scaling_document
 from service.presenters.verdicts import verdicts_document
 from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.designs import DesignId
-from service.schemas.controller_answers import DesignMargin, InterpolatedGains, Requirements, Verdicts
-from service.schemas.controller_answers import Response as StepResponse
+from service.schemas.controller_answers import DesignMargin, InterpolatedGains, Verdicts
 from service.schemas.scaling_answers import Scaling
 from service.schemas.wire import PARAMETERS
-from service.state import HEAVY, DesignsHere, SettingsHere
+from service.state import HEAVY, DesignsHere
 from service.units import unit_of
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}", tags=["controllers"])
 
 ControllerName = Annotated[str, Path(alias="name", description="Name of the controller", examples=["nf"])]
 Point = Annotated[int, Field(description="Flat row-major index of the grid point, from 0", examples=[3])]
-
-
-class WantedResponse(BaseModel):
-    """Which response is wanted, and how finely."""
-
-    model_config = PARAMETERS
-
-    point: Point
-    kind: Literal["linear"] = Field(default="linear", description="This version answers the exact linear response")
-    duration_s: Annotated[float, Field(ge=1e-3, le=1e3)] | None = Field(
-        default=None, description="How long it is followed; without it, as long as the design's reference"
-    )
-    samples: Annotated[int, Field(ge=2)] = Field(default=501, description="Samples, both ends included")
 
 
 class FlightConditionWanted(BaseModel):
@@ -63,44 +43,6 @@ class FlightConditionWanted(BaseModel):
     dynamic_pressure_pa: float | None = Field(default=None, description="When it is the grid's axis", examples=[700.0])
     airspeed_m_s: float | None = Field(default=None, description="When it is the grid's axis")
     mach: float | None = Field(default=None, description="When it is the grid's axis")
-
-
-@router.get("/response", response_model=StepResponse, responses=problems(404, 409, 422, 503), dependencies=[HEAVY])
-def response(
-    request: Request,
-    ident: DesignId,
-    name: ControllerName,
-    wanted: Annotated[WantedResponse, Query()],
-    designs: DesignsHere,
-    settings: SettingsHere,
-) -> Response:
-    """The response to the design's reference step at one point: every signal, trim values included."""
-    check_size("/samples", "samples", wanted.samples, "max_response_samples", settings)
-    envelope = designs.envelope(ident)
-    controller = controller_of(envelope, name)
-    index = point_with_gains(envelope, controller, wanted.point)
-    reference = envelope.study.reference
-    duration = wanted.duration_s or reference.duration
-    loop = controller.loop.take(index)
-    step = reference.sizes(loop.references)
-    document = {"name": name, "point": wanted.point, "kind": wanted.kind} | reference_document(reference, duration)
-    if isinstance(loop, CodedLoop):
-        shown = sampled_response_document(sampled_step_response(loop, step, duration), wanted.samples)
-    else:
-        shown = response_document(delayed_step_response(loop, step, duration, wanted.samples))
-    return answer(request, encode(document | shown))
-
-
-@router.get(
-    "/actuator-requirements",
-    response_model=Requirements,
-    responses=problems(404, 409, 503),
-    dependencies=[HEAVY],
-)
-def actuator_requirements(request: Request, ident: DesignId, name: ControllerName, designs: DesignsHere) -> Response:
-    """What the reference step asks of each actuator: torque, rate, power and energy over the grid, and the worst."""
-    envelope = designs.envelope(ident)
-    return answer(request, encode(requirements_document(envelope, controller_of(envelope, name))))
 
 
 @router.get("/verdicts", response_model=Verdicts, responses=problems(404, 409, 503), dependencies=[HEAVY])

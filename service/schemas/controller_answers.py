@@ -8,6 +8,7 @@ from pydantic import Field
 
 from service.schemas.design import Gain, Grid, GridNumbers, GridOutcomes, GridReasons, Kind, Verdict
 from service.schemas.point import Complex
+from service.schemas.requirement_answers import Worst
 from service.schemas.wire import Answer
 
 
@@ -77,73 +78,6 @@ class RootLocus(Answer):
     departures: list[BranchAngle] = Field(description="From the open loop's poles")
     arrivals: list[BranchAngle] = Field(description="At the finite zeros")
     constant_damping: ConstantDamping
-
-
-class Response(Answer):
-    """The response to the reference step from trim; every signal is a total, under a name that ends in its unit."""
-
-    name: str
-    point: int
-    kind: Literal["linear"]
-    reference: ReferenceStep
-    time_s: list[float]
-    signals: dict[str, list[float | None]]
-    units: dict[str, str]
-
-
-class ReferenceStep(Answer):
-    """The manoeuvre that is followed."""
-
-    kind: Literal["step"]
-    aileron_deg: float
-    tab_deg: float
-    duration_s: float
-
-
-class Demand(Answer):
-    """Demand on one actuator over the grid; null where there is no design or the figure is unlimited."""
-
-    peak_torque_n_m: GridNumbers
-    rms_torque_n_m: GridNumbers
-    holding_torque_n_m: GridNumbers
-    peak_rate_deg_s: GridNumbers
-    peak_acceleration_deg_s2: GridNumbers = Field(json_schema_extra={"unit": "deg/s^2"})
-    rms_acceleration_deg_s2: GridNumbers = Field(json_schema_extra={"unit": "deg/s^2"})
-    peak_deflection_deg: GridNumbers
-    peak_power_w: GridNumbers
-    rms_power_w: GridNumbers
-    energy_out_j: GridNumbers
-    energy_back_j: GridNumbers
-
-
-class Worst(Answer):
-    """The largest value over the grid, and the flat point that sets it."""
-
-    value: float | None = Field(json_schema_extra={"unit": "that of the figure"})
-    point: int | None
-
-
-class Limits(Answer):
-    """What the actuator can do, as the request gave it; null is unlimited."""
-
-    deflection_deg: float | None
-    rate_deg_s: float | None
-    torque_n_m: float | None
-    power_w: float | None
-
-
-class Requirements(Answer):
-    """What the reference step asks of each actuator of the controller, trim torque included."""
-
-    name: str
-    kind: Kind
-    reference: ReferenceStep
-    grid: Grid
-    outcomes: GridOutcomes
-    reasons: GridReasons
-    actuators: dict[str, Demand]
-    envelope: dict[str, dict[str, Worst]]
-    limits: dict[str, Limits]
 
 
 class SpecVerdict(Verdict):

@@ -149,7 +149,12 @@ class Reference(Request):
         default=0.0,
         description="Size of the tab's step, of controllers with the reference `aileron_and_tab`; zero without one",
     )
-    rate_limit_deg_s: None = Field(default=None, description="This version follows an unlimited step only")
+    rate_limit_deg_s: Annotated[float, Field(ge=1e-3, le=1e6)] | None = Field(
+        default=None,
+        description="Rate at which the references go there, for what actuators are asked for; null: at once. Settling "
+        "time, overshoot and the like are those of a step at once, and so are rates and deflections that gains are "
+        "chosen by",
+    )
     duration_s: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(description="How long the response is followed")
 
     @model_validator(mode="after")

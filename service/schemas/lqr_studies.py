@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from service.schemas.controller_answers import ReferenceStep, Worst
 from service.schemas.design import Grid, GridNumbers, GridOutcomes, GridReasons, Kind
+from service.schemas.requirement_answers import ReferenceStep, Worst
 from service.schemas.weights import PlainWeights, PowerWeights
 from service.schemas.wire import Answer
 

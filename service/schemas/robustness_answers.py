@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from service.schemas.controller_answers import ReferenceStep
 from service.schemas.design import Grid, GridNumbers, GridOutcomes, GridReasons, Kind
+from service.schemas.requirement_answers import ReferenceStep
 from service.schemas.wire import Answer
 
 FlownOutcome = Literal["ok", "unstable", "unproved", "no_step", "not_settled", "no_design", "outside_model"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from service.schemas.controller_answers import ReferenceStep
 from service.schemas.design import Grid, Kind
+from service.schemas.requirement_answers import ReferenceStep
 from service.schemas.wire import Answer
 
 #: One value for each of the answer's points, in their order; null where it does not exist.

@@ -6,9 +6,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from service.schemas.controller_answers import Worst
 from service.schemas.design import Gain, Grid, GridNumbers, GridOutcomes, GridReasons, Kind
 from service.schemas.point import Complex
+from service.schemas.requirement_answers import Worst
 from service.schemas.wire import Answer
 
 GridFlags = list[list[bool]]

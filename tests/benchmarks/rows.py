@@ -31,6 +31,7 @@ from tests.benchmarks import peers
 from tests.benchmarks.cases import DURATION, GAINS, SAMPLES, STEP, TAB_ACTUATOR, Case, case, tab_only
 from tests.benchmarks.manoeuvre_rows import manoeuvre_rows
 from tests.benchmarks.measure import Row
+from tests.benchmarks.simulation_rows import simulation_rows
 
 
 def rows() -> list[Row]:
@@ -51,6 +52,7 @@ def rows() -> list[Row]:
         _steps(c),
         _refined_steps(c),
         *manoeuvre_rows(c),
+        *simulation_rows(c),
         _whole(c),
     ]
 

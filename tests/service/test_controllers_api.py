@@ -11,6 +11,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import expm
 
 from service.schemas import controller_answers as answers
+from service.schemas import requirement_answers
 from service.schemas.point import LinearModels, Point
 
 NAMES = ("nf", "pf", "lqr")
@@ -120,7 +121,7 @@ def test_root_locus(client: TestClient, here: str, point: dict[str, Any], name: 
 @pytest.mark.parametrize("name", NAMES)
 def test_response(client: TestClient, here: str, point: dict[str, Any], name: str) -> None:
     response = client.get(f"{here}/controllers/{name}/response", params={"point": 3, "kind": "linear"})
-    document = answers.Response.model_validate(response.json()).model_dump()
+    document = requirement_answers.Response.model_validate(response.json()).model_dump()
     signals = {key: np.array(values) for key, values in document["signals"].items()}
     assert {"da_deg", "dt_deg", "T_t_n_m", "T_a_n_m"} <= set(signals)
     assert set(document["units"]) == set(signals)
@@ -163,7 +164,7 @@ def test_response_of_the_regulator_by_the_matrix_exponential(
 @pytest.mark.parametrize("name", NAMES)
 def test_requirements(client: TestClient, here: str, name: str) -> None:
     response = client.get(f"{here}/controllers/{name}/actuator-requirements")
-    document = answers.Requirements.model_validate(response.json()).model_dump()
+    document = requirement_answers.Requirements.model_validate(response.json()).model_dump()
     assert set(document["actuators"]) == ({"tab", "aileron"} if name == "lqr" else {"tab"})
     for actuator, figures in document["actuators"].items():
         letter = actuator[0]
@@ -217,7 +218,7 @@ def test_gains_outside_the_grid_are_clipped(client: TestClient, here: str, desig
         ("root-locus?point=0&count=99", "/count", "an integer >= 100"),
         ("root-locus?point=0&count=2001", "/count", "<= 2000"),
         ("root-locus?point=0&gain=3", "/gain", "fields point, loop, damping_ratio, count"),
-        ("response?point=0&kind=nonlinear", "/kind", "only linear"),
+        ("response?point=0&kind=exact", "/kind", "one of linear, nonlinear"),
         ("response?point=0&samples=5001", "/samples", "<= 5000"),
         ("response?point=0&samples=1", "/samples", "an integer >= 2"),
         ("response?point=0&duration_s=nan", "/duration_s", ">= 0.001 and <= 1000, or null"),
@@ -260,7 +261,7 @@ def test_no_gains_at_a_point(client: TestClient, wanted: Any, refused: Any) -> N
         assert problem["code"] == "no_design_at_point"
         assert controller["reasons"][0][0] in problem["detail"]
     requirements = client.get(f"{here}/controllers/pf/actuator-requirements").json()
-    answers.Requirements.model_validate(requirements)
+    requirement_answers.Requirements.model_validate(requirements)
     assert requirements["actuators"]["tab"]["peak_torque_n_m"] == [[None]]
     assert requirements["envelope"]["tab"]["peak_torque_n_m"] == {"value": None, "point": None}
     assert requirements["reasons"] == controller["reasons"]

@@ -60,6 +60,7 @@ def test_both_references_are_followed(client: TestClient) -> None:
     assert found["reference"] == {
         "kind": "step",
         **{k: step[k] for k in ("aileron_deg", "tab_deg")},
+        "rate_limit_deg_s": None,
         "duration_s": 20.0,
     }
     assert signals["da_deg"][-1] - signals["da_deg"][0] == pytest.approx(step["aileron_deg"], abs=1e-3)
