@@ -15,7 +15,7 @@ from schedules.wire_names import axis_name
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
 #: Names that the files use for themselves, so that no gain may have them.
-RESERVED = frozenset({"outcome", "ok", "gainfield", "lookup", "K", "N"})
+RESERVED = frozenset({"outcome", "ok", "filled", "gainfield", "lookup", "K", "N"})
 
 
 def require_writable(schedule: GainSchedule) -> None:

@@ -55,7 +55,7 @@ def write_matlab(schedule: GainSchedule) -> bytes:
             about[f"{symbol}_rows"] = _cells(matrix.rows)
             about[f"{symbol}_columns"] = _cells(matrix.columns)
     if 1 in schedule.shape:
-        variables["lookup"] = _lookup(schedule)
+        variables["lookup"] = lookup_tables(schedule)
         about["lookup"] = LOOKUP
     variables["gainfield"] = about
     content = io.BytesIO()
@@ -111,7 +111,8 @@ def _about(schedule: GainSchedule) -> dict[str, Any]:
     }
 
 
-def _lookup(schedule: GainSchedule) -> dict[str, FloatArray]:
+def lookup_tables(schedule: GainSchedule) -> dict[str, FloatArray]:
+    """Axes and gains by name, every axis with two breakpoints at least: the gains are repeated along a second one."""
     table: dict[str, FloatArray] = {}
     for axis in schedule.axes:
         values = axis.values

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
+from pydantic import BaseModel, Field
 
-from schedules.files import FILE_FORMATS, write_schedule
+from schedules.files import FILE_FORMATS, FileFormat, FillRule, MissingGains, file_name_parts, write_schedule
 from schedules.schedule_of import schedule_of
 from service.answering import answer, download_headers
 from service.designs import controller_of
 from service.openapi import problems
-from service.refusals import NotFound
+from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound
 from service.routes.designs import DesignId
+from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere
 
 router = APIRouter(prefix="/v1/designs/{id}/schedules", tags=["schedules"])
@@ -24,25 +26,59 @@ _FILE: dict[int | str, dict[str, Any]] = {
     }
 }
 
+_WITH_MISSING = ", ".join(f.suffix for f in FILE_FORMATS.values() if f.says_missing)
+_WITHOUT_MISSING = ", ".join(f.suffix for f in FILE_FORMATS.values() if not f.says_missing)
+
+
+class Options(BaseModel):
+    """What the file is to hold."""
+
+    model_config = PARAMETERS
+
+    fill: FillRule | None = Field(
+        default=None,
+        description=f"Where points without gains get them from, in tables that need a number everywhere "
+        f"({_WITHOUT_MISSING}); the file names every point that was filled. Not for {_WITH_MISSING}, which say where "
+        f"there is no gain",
+    )
+
 
 @router.get(
     "/{controller}.{suffix}",
     response_class=Response,
-    responses=_FILE | problems(404, 409, 503),
+    responses=_FILE | problems(404, 409, 422, 503),
     dependencies=[HEAVY],
 )
 def download_schedule(
     request: Request,
     ident: DesignId,
     controller: Annotated[str, Path(description="Name of the controller", examples=["nf"])],
-    suffix: Annotated[str, Path(description="Format: json, csv or mat", examples=["csv"])],
+    suffix: Annotated[str, Path(description=f"Format: {', '.join(FILE_FORMATS)}", examples=["csv"])],
+    options: Annotated[Options, Query()],
     designs: DesignsHere,
 ) -> Response:
-    """The gain schedule of one controller, with its outcomes, units, law and rule between the points."""
+    """The gain schedule of one controller, with its outcomes, units, law and rule between the points.
+
+    A table that needs a number everywhere is refused (409) when a point has no gains, unless `fill` says where they
+    come from.
+    """
     if suffix not in FILE_FORMATS:
         raise NotFound(f"there is no schedule file {suffix[:80]!a}; there are {', '.join(FILE_FORMATS)}")
+    form = FILE_FORMATS[suffix]
+    _check_fill(form, options.fill)
     envelope = designs.envelope(ident)
     schedule = schedule_of(envelope, controller_of(envelope, controller), designs.provenance(ident))
-    headers = download_headers(envelope.study.name, controller, suffix=suffix)
-    content = write_schedule(schedule, suffix)
-    return answer(request, content, media_type=FILE_FORMATS[suffix].media_type, headers=headers)
+    try:
+        content = write_schedule(schedule, suffix, options.fill)
+    except MissingGains as missing:
+        detail = f"{missing}; {_WITH_MISSING} files say where there is no gain"
+        raise NoDesignAtPoint(detail) from missing
+    headers = download_headers(*file_name_parts(schedule, suffix), suffix=suffix)
+    return answer(request, content, media_type=form.media_type, headers=headers)
+
+
+def _check_fill(form: FileFormat, fill: FillRule | None) -> None:
+    if fill is not None and form.says_missing:
+        detail = f"a {form.suffix} file says where there is no gain and takes no fill rule"
+        allowed = f"{' or '.join(get_args(FillRule))} with {_WITHOUT_MISSING}; nothing with {_WITH_MISSING}"
+        raise InvalidRequest(f"/fill: {detail}", FieldRefusal("/fill", detail, None, allowed))

@@ -3,7 +3,8 @@ import json
 import numpy as np
 import pytest
 
-from schedules.files import FILE_FORMATS, read_json, write_schedule
+from schedules.files import FILE_FORMATS, MissingGains, read_json, write_schedule
+from schedules.fill import FILL_RULES
 from schedules.schedule import INTERPOLATION_RULE, OUT_OF_RANGE_RULE, SCHEMA_VERSION, SIGN_CONVENTION
 
 SHAPES = [
@@ -64,18 +65,59 @@ def test_media_types():
         "json": "application/json",
         "csv": "text/csv; charset=utf-8",
         "mat": "application/x-matlab-data",
+        "npz": "application/x-npz",
+        "h": "text/x-chdr; charset=utf-8",
+        "c": "text/x-csrc; charset=utf-8",
+        "m": "text/x-matlab; charset=utf-8",
+        "xml": "application/xml",
+        "dml": "application/xml",
     }
 
 
 @pytest.mark.parametrize("suffix", FILE_FORMATS)
 def test_same_schedule_same_bytes(make_schedule, suffix):
-    first, second = (write_schedule(make_schedule((4, 6), failed=[(1, 2)]), suffix) for _ in range(2))
+    fill = None if FILE_FORMATS[suffix].says_missing else "nearest_ok"
+    first, second = (write_schedule(make_schedule((4, 6), failed=[(1, 2)]), suffix, fill) for _ in range(2))
     assert first == second
-    assert first != write_schedule(make_schedule((4, 6), failed=[(1, 2)], seed=1), suffix)
+    assert first != write_schedule(make_schedule((4, 6), failed=[(1, 2)], seed=1), suffix, fill)
+
+
+@pytest.mark.parametrize("suffix", FILE_FORMATS)
+def test_missing_gains_are_said_or_filled_by_a_named_rule(make_schedule, suffix):
+    schedule = make_schedule((2, 3), failed=[(1, 2)])
+    if FILE_FORMATS[suffix].says_missing:
+        with pytest.raises(ValueError, match=f"a {suffix} file says where there is no gain: it takes no fill rule"):
+            write_schedule(schedule, suffix, "nearest_ok")
+        return
+    with pytest.raises(MissingGains, match="no gains at 1 of 6 points"):
+        write_schedule(schedule, suffix)
+    with pytest.raises(ValueError, match="no fill rule 'zeros'"):
+        write_schedule(schedule, suffix, "zeros")
+    nearest, held = (write_schedule(schedule, suffix, rule) for rule in FILL_RULES)
+    assert nearest != held
+    assert b"nearest_ok: a point that is not ok has all gains of the nearest ok point" in nearest
+    assert b"hold_neighbour: a point that is not ok has all gains of the nearest ok point along" in held
+    assert b"filled_point [1, 2]: infeasible, gains of point [1, 1]; gain margin 4.1 dB" in held
+    complete = make_schedule((2, 3))
+    assert write_schedule(complete, suffix, "nearest_ok") == write_schedule(complete, suffix)
+    assert b"none: every point of the grid is ok" in write_schedule(complete, suffix)
+
+
+@pytest.mark.parametrize("suffix", FILE_FORMATS)
+def test_every_file_says_what_it_is(make_schedule, suffix):
+    """The same words in every format; those of archives and MAT-files are read in the tests of these."""
+    if suffix in ("mat", "npz"):
+        return
+    schedule = make_schedule((2, 3))
+    text = write_schedule(schedule, suffix).decode("ascii")
+    words = [schedule.law, SIGN_CONVENTION, INTERPOLATION_RULE, OUT_OF_RANGE_RULE, "negative_feedback"]
+    words += [schedule.provenance.design_id, schedule.provenance.request_digest, schedule.provenance.created_at]
+    for word in [*words, "schema_version", "altitude_m", "dynamic_pressure_pa"]:
+        assert word in text or word.replace("'", "''") in text, word
 
 
 def test_unknown_format_lists_those_there_are(make_schedule):
-    with pytest.raises(ValueError, match="'xls'; there are: json, csv, mat"):
+    with pytest.raises(ValueError, match="'xls'; there are: json, csv, mat, npz, h, c, m, xml, dml"):
         write_schedule(make_schedule(), "xls")
 
 

@@ -137,7 +137,7 @@ FIELDS = [
         "0 unless a controller has the reference aileron_and_tab",
     ),
     ("/reference/tab_deg", 61, "/reference/tab_deg", "deg", ">= -60 and <= 60"),
-    ("/reference/rate_limit_deg_s", 0, "/reference/rate_limit_deg_s", "deg/s", ">= 0.001 and <= 1000000, or null"),
+    ("/reference/rate_limit_deg_s", 0, "/reference/rate_limit_deg_s", "deg/s", ">= 0.001 and <= 1e+06, or null"),
     ("/reference/duration_s", 0, "/reference/duration_s", "s", ">= 0.001 and <= 1000"),
     ("/controllers", [], "/controllers", None, "a list, at least 1 items"),
     (
