@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from typing import Any
-from urllib.parse import quote
 
 import pytest
 from fastapi.routing import APIRoute
@@ -16,6 +14,7 @@ from service.design_examples import design_requests
 from service.errors import STATUS
 from service.routes import ROUTERS
 from service.schemas.problem import Problem
+from tests.service.openapi_examples import address, operations
 
 METHODS = ("get", "post")
 
@@ -32,33 +31,6 @@ def shown(client: TestClient, design: dict[str, Any]) -> list[str]:
     response = client.post("/v1/designs", json=design_requests()["lqr_power"][1])
     assert response.status_code in (200, 201), response.text
     return [design["id"], response.json()["id"]]
-
-
-def operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    for path, methods in document["paths"].items():
-        for method, operation in methods.items():
-            yield path, method, operation
-
-
-def example_of(parameter: dict[str, Any]) -> Any:
-    """The example of a parameter; None when an optional one has none."""
-    if "example" in parameter:
-        return parameter["example"]
-    examples = parameter.get("examples") or parameter["schema"].get("examples")
-    assert examples or not parameter["required"], f"{parameter['name']} is required and has no example"
-    return examples[0] if examples else None
-
-
-def address(path: str, operation: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Path and query of the operation with the examples of its parameters."""
-    query = {}
-    for parameter in operation.get("parameters", []):
-        value = example_of(parameter)
-        if parameter["in"] == "path":
-            path = path.replace(f"{{{parameter['name']}}}", quote(str(value)))
-        elif value is not None:
-            query[parameter["name"]] = value
-    return path, query
 
 
 def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
