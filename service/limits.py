@@ -6,6 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from design.loop import Loop
+from design.manoeuvre import Manoeuvre
+from design.simulation.request import SimulationRequest
+from design.simulation.simulate import simulation_steps
+from design.simulation.time_grid import LARGEST_COUNT
 from model.flight import flight_grid
 from schedules.study import PlantStudy
 from service.refusals import FieldRefusal, InvalidRequest, LimitExceeded
@@ -36,6 +41,8 @@ LIMITS = {
     "max_step_samples": "1",
     "max_flown_knots": "1",
     "max_simulated_steps": "1",
+    "max_worst_case_rows": "1",
+    "max_compared_samples": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
 }
@@ -154,6 +161,33 @@ def check_design(request: DesignRequest, settings: Settings) -> None:
         "meet or with delays, these times 1 + delay_states // 2, and 4 more with a Kalman filter"
     )
     check_size("/grid", what, searches, "max_tab_only_designs", settings)
+
+
+def check_steps(
+    pointer: str,
+    loop: Loop,
+    manoeuvre: Manoeuvre,
+    asked: SimulationRequest,
+    settings: Settings,
+    times: int = 1,
+) -> None:
+    """Refuse simulations of too many steps: those of all points, and those of the point with most 100 times.
+
+    Parameters
+    ----------
+    pointer : field that the steps grow with
+    loop : of the points that carry a design
+    times : how many simulations of this kind
+
+    Raises
+    ------
+    LimitExceeded
+    """
+    check_size("/manoeuvre", "knots of the manoeuvre", len(manoeuvre.times), "max_flown_knots", settings)
+    steps = np.minimum(simulation_steps(loop, manoeuvre, asked), LARGEST_COUNT)
+    work = times * int(steps.sum() + 100 * steps.max(initial=0))
+    what = "steps of the simulation: of all points, and 100 times those of the point with most"
+    check_size(pointer, what, work, "max_simulated_steps", settings)
 
 
 def _searches(wanted: Controller, actuators: Actuators) -> int:

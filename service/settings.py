@@ -57,6 +57,18 @@ class Settings(BaseSettings):
         ge=1,
         description="Steps of a non-linear simulation: of all points, and 100 times those of the point with most",
     )
+    max_worst_case_rows: int = Field(
+        default=100_000,
+        ge=1,
+        description="Rows of guaranteed peaks: grid points times signals times references, each counted the more often "
+        "the longer the loop swings",
+    )
+    max_compared_samples: int = Field(
+        default=60_000_000,
+        ge=1,
+        description="Samples of a comparison: of the step and each of its rate-limited forms, of every controller at "
+        "every grid point, as finely as its fastest mode needs for as long as it lasts",
+    )
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

@@ -111,6 +111,8 @@ def _moving(samples: Samples, direct: float, of_rate: float, travel_time: float)
     if lead > 0.0:
         s, rho = np.append(s, s[-1] + lead), np.append(rho, 0.0)
     times, values = (s[-1] - s[::-1]) * samples.horizon[0], rho[::-1]
+    later = np.append(np.diff(times) > 0.0, True)  # rounding merges knots
+    times, values = times[later], values[later]
     slopes = np.append(np.diff(values) / np.diff(times), 0.0)
     turns = np.abs(np.diff(slopes, prepend=0.0)) * travel_time > 1e-9  # the others lie on a straight line
     turns[[0, -1]] = True

@@ -158,7 +158,7 @@ def _pairs(pairs: FloatArray, points: IntArray) -> list[dict[str, Any]]:
 
 def _envelope(figures: dict[str, dict[str, FloatArray]]) -> dict[str, Any]:
     """Largest of each figure, and the point that sets it."""
-    return {name: {key: _worst(values) for key, values in over_grid.items()} for name, over_grid in figures.items()}
+    return {name: {key: worst(values) for key, values in over_grid.items()} for name, over_grid in figures.items()}
 
 
 def reference_document(reference: Reference, duration: float) -> dict[str, Any]:
@@ -182,7 +182,7 @@ def _over_grid(
     }
 
 
-def _worst(values: FloatArray) -> dict[str, Any]:
+def worst(values: FloatArray) -> dict[str, Any]:
     """Largest value and the flat point that sets it; null when no point has one."""
     if np.all(np.isnan(values)):
         return {"value": None, "point": None}

@@ -1,6 +1,7 @@
 """The routes, one file a subject. A route reads its parameters, calls one function of the domain, and answers."""
 
 from service.routes import (
+    actuation_comparison,
     atmosphere,
     controllers,
     cross_flight,
@@ -9,6 +10,7 @@ from service.routes import (
     examples,
     frequency_response,
     hinge_moments,
+    limited_tab,
     linear_models,
     meta,
     norms,
@@ -23,6 +25,7 @@ from service.routes import (
     simultaneous_margins,
     spec_packs,
     steady_state_maps,
+    worst_case,
 )
 from service.routes import schedules as schedule_files
 
@@ -33,14 +36,17 @@ ROUTERS = (
     root_locus.router,
     controllers.router,
     requirements.router,
+    limited_tab.router,
     frequency_response.router,
     cross_flight.router,
     robust_performance.router,
+    worst_case.router,
     simultaneous_margins.router,
     norms.router,
     phase_plane.router,
     power_comparison.router,
     sample_time_sweep.router,
+    actuation_comparison.router,
     schedule_files.router,
     linear_models.router,
     eigenvalue_sweeps.router,

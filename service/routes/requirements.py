@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, Field
 
@@ -17,14 +16,13 @@ from design.response.manoeuvre_response import manoeuvre_response
 from design.simulation.plant import NonlinearPlant
 from design.simulation.request import SimulationRequest
 from design.simulation.response import NonlinearResponse
-from design.simulation.simulate import simulate, simulation_steps
-from design.simulation.time_grid import LARGEST_COUNT
+from design.simulation.simulate import simulate
 from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.requirements import requirements, simulated
 from schedules.study import Reference
 from service.answering import answer, encode
 from service.designs import continuous_loop, controller_of, point_with_gains
-from service.limits import check_size
+from service.limits import check_size, check_steps
 from service.lqr_studies import refused_by_the_domain
 from service.manoeuvre_of import manoeuvre_of, simulation_of
 from service.openapi import BODY, problems
@@ -155,7 +153,7 @@ def requirements_of_manoeuvre(
     nonlinear = None
     if body.nonlinear is not None:
         asked = simulation_of(body.nonlinear, envelope.study, body.duration_s, SIMULATED_SAMPLES)
-        _check_steps(loop.take(controller.outcomes.ok), manoeuvre, asked, settings)
+        check_steps("/duration_s", loop.take(controller.outcomes.ok), manoeuvre, asked, settings)
         with refused_by_the_domain(name):
             nonlinear = simulated(envelope.plant, controller, manoeuvre, asked)
     linear = requirements(envelope.study, controller, manoeuvre, body.duration_s)
@@ -173,26 +171,12 @@ def _simulated_at(
 ) -> NonlinearResponse:
     """The non-linear response at one point."""
     loop, plant = continuous_loop(controller).take(index), envelope.plant
-    _check_steps(loop, manoeuvre, asked, settings)
+    check_steps("/duration_s", loop, manoeuvre, asked, settings)
     with refused_by_the_domain(controller.request.name):
         at = NonlinearPlant.of(
             plant.system, plant.grid.condition.take(index), plant.trim.take(index), plant.model.take(index)
         )
         return simulate(at, loop, manoeuvre, asked)
-
-
-def _check_steps(loop: Loop, manoeuvre: Manoeuvre, asked: SimulationRequest, settings: Settings) -> None:
-    """Refuse a simulation of too many steps: those of all points, and those of the point with most 100 times.
-
-    Raises
-    ------
-    LimitExceeded
-    """
-    check_size("/manoeuvre", "knots of the manoeuvre", len(manoeuvre.times), "max_flown_knots", settings)
-    steps = np.minimum(simulation_steps(loop, manoeuvre, asked), LARGEST_COUNT)
-    work = int(steps.sum() + 100 * steps.max(initial=0))
-    what = "steps of the simulation: of all points, and 100 times those of the point with most"
-    check_size("/duration_s", what, work, "max_simulated_steps", settings)
 
 
 def _reference_response(loop: Loop | CodedLoop, reference: Reference, duration: float, samples: int) -> dict[str, Any]:

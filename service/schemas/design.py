@@ -134,17 +134,20 @@ class Links(Answer):
     response: dict[str, str]
     frequency_response: dict[str, str]
     actuator_requirements: dict[str, str]
+    limited_tab: dict[str, str]
     verdicts: dict[str, str]
     design_margin: dict[str, str]
     scaling: dict[str, str]
     cross_flight: dict[str, str]
     robust_performance: dict[str, str]
+    worst_case: dict[str, str]
     simultaneous_margins: dict[str, str] = Field(description="This and the four below: of state feedback")
     norms: dict[str, str]
     phase_plane: dict[str, str]
     power_comparison: dict[str, str]
     sample_time_sweep: dict[str, str]
     gains: dict[str, str]
+    actuation_comparison: str
     schedules: dict[str, dict[str, str]]
 
 

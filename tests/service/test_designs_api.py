@@ -192,10 +192,10 @@ def test_links_lead_somewhere(client: TestClient, design: dict[str, Any]) -> Non
         "gains": "?altitude_m=0&dynamic_pressure_pa=500",
         "sample_time_sweep": "?from_s=0.001&to_s=0.002&count=2",
     }
-    followed = [links["self"], links["points"].format(index=0)]
+    followed = [links["self"], links["points"].format(index=0), links["actuation_comparison"]]
     followed += [path for files in links["schedules"].values() for path in files.values()]
     for what, addresses in links.items():
-        if what in ("self", "points", "schedules", "power_comparison"):
+        if what in ("self", "points", "schedules", "power_comparison", "actuation_comparison"):
             continue
         assert set(addresses) <= {"nf", "pf", "lqr"}
         followed += [path + queries.get(what, "") for path in addresses.values()]

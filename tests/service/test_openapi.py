@@ -47,11 +47,15 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/frequency-response"),
         ("get", "/v1/designs/{id}/controllers/{name}/cross-flight"),
         ("get", "/v1/designs/{id}/controllers/{name}/robust-performance"),
+        ("get", "/v1/designs/{id}/controllers/{name}/worst-case"),
+        ("get", "/v1/designs/{id}/controllers/{name}/worst-case/reference"),
+        ("get", "/v1/designs/{id}/actuation-comparison"),
         ("get", "/v1/designs/{id}/controllers/{name}/simultaneous-margins"),
         ("get", "/v1/designs/{id}/controllers/{name}/norms"),
         ("get", "/v1/designs/{id}/controllers/{name}/phase-plane"),
         ("get", "/v1/designs/{id}/controllers/{name}/power-comparison"),
         ("get", "/v1/designs/{id}/controllers/{name}/sample-time-sweep"),
+        ("get", "/v1/designs/{id}/controllers/{name}/limited-tab"),
         ("get", "/v1/designs/{id}/controllers/{name}/verdicts"),
         ("get", "/v1/designs/{id}/controllers/{name}/design-margin"),
         ("get", "/v1/designs/{id}/controllers/{name}/scaling"),
@@ -116,7 +120,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 33
+    assert checked == 37
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
