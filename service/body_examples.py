@@ -154,6 +154,25 @@ def _responses() -> Examples:
     }
 
 
+def _weight_searches() -> Examples:
+    specs = {"settling_time_s_max": 0.3, "overshoot_percent_max": 5.0, "damping_ratio_min": 0.5}
+    varying = specs | {"settling_time_s_max": {"axis": "dynamic_pressure_pa", "values": [0.4, 0.35, 0.3, 0.2]}}
+    return {
+        "one_point": _shown("at one point, within the actuators' limits", {"specs": specs, "points": [3]}),
+        "common": _shown(
+            "the same weights at two points, with the least peak power, by a settling time that varies",
+            {"specs": varying, "minimised": "peak_total_power", "common": True, "points": [2, 3]},
+        ),
+    }
+
+
+def _trade_offs() -> Examples:
+    specs = {"settling_time_s_max": 0.3, "overshoot_percent_max": 5.0, "damping_ratio_min": 0.5}
+    searched = ["tab_rate_deg_s", "aileron_rate_deg_s", "aileron_integral_deg_s", "aileron_torque_n_m"]
+    wanted = {"specs": specs, "count": 4, "points": [3], "searched": searched}
+    return {"one_point": _shown("from the fastest to 0.3 s, by four of the weights", wanted)}
+
+
 BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/designs": _designs,
     "/v1/hinge-moments": _hinge_moments,
@@ -163,4 +182,6 @@ BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/similarity": _similarity,
     "/v1/designs/{id}/controllers/{name}/response": _responses,
     "/v1/designs/{id}/controllers/{name}/actuator-requirements": _requirements,
+    "/v1/designs/{id}/controllers/{name}/weight-search": _weight_searches,
+    "/v1/designs/{id}/controllers/{name}/trade-off": _trade_offs,
 }

@@ -69,6 +69,11 @@ class Settings(BaseSettings):
         description="Samples of a comparison: of the step and each of its rate-limited forms, of every controller at "
         "every grid point, as finely as its fastest mode needs for as long as it lasts",
     )
+    max_weight_searches: int = Field(
+        default=24,
+        ge=1,
+        description="Searches of weights: grid points, of a trade-off times its settling times",
+    )
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

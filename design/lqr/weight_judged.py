@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from design.assess import achieved, assess
 from design.lqr.flown import flown_loop
-from design.lqr.power_figures import power_figures
+from design.lqr.step_figures import step_figures
 from design.lqr.synthesis import LqrDesign, design_lqr
 from design.lqr.weight_candidates import Candidates
-from design.lqr.weight_request import Minimised
 from design.lqr.weight_searches import HAND, Searches
 from design.outcome import Outcomes
 from model.arrays import BoolArray, FloatArray, GridArrays, IntArray
@@ -55,19 +53,7 @@ def judged(candidates: Candidates, z: FloatArray, points: IntArray) -> Judged:
     values, least = np.full((len(z), len(search.specs)), np.nan), np.full(len(z), np.nan)
     if ok.any():
         loop = flown_loop(model.take(ok), structure, design.K[ok], design.N[ok])
-        sizes = {"r_a": search.step.aileron, "r_t": search.step.tab}
-        reference = np.array([sizes[name] for name in loop.references])
-        assessment = assess(loop, reference, search.step.duration, samples=2)
-        for k, spec in enumerate(search.specs):
-            values[ok, k] = achieved(assessment, spec.quantity)
-        tab, aileron = assessment.demand
-        found: dict[Minimised, FloatArray] = {
-            "total_rms_power": tab.rms_power + aileron.rms_power,
-            "peak_aileron_torque": aileron.peak_torque,
-            "energy_out": tab.energy_out + aileron.energy_out,
-        }
-        minimised = search.minimised
-        least[ok] = power_figures(loop, search.step).total if minimised == "peak_total_power" else found[minimised]
+        values[ok], least[ok] = step_figures(loop, search.specs, search.minimised, search.step)
     return Judged(maxima, design, values, least)
 
 

@@ -116,6 +116,8 @@ def links(ident: str, controllers: dict[str, str]) -> dict[str, Any]:
         "phase_plane": each("phase-plane", ("lqr",)),
         "power_comparison": each("power-comparison", ("lqr",)),
         "sample_time_sweep": each("sample-time-sweep", ("lqr",)),
+        "weight_search": each("weight-search", ("lqr",)),
+        "trade_off": each("trade-off", ("lqr",)),
         "gains": each("gains"),
         "actuation_comparison": f"{here}/actuation-comparison",
         "schedules": {

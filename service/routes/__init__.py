@@ -25,6 +25,7 @@ from service.routes import (
     simultaneous_margins,
     spec_packs,
     steady_state_maps,
+    weight_search,
     worst_case,
 )
 from service.routes import schedules as schedule_files
@@ -47,6 +48,7 @@ ROUTERS = (
     power_comparison.router,
     sample_time_sweep.router,
     actuation_comparison.router,
+    weight_search.router,
     schedule_files.router,
     linear_models.router,
     eigenvalue_sweeps.router,

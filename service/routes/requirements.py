@@ -29,6 +29,7 @@ from service.openapi import BODY, problems
 from service.presenters.requirements import flown_requirements_document, reference_document, requirements_document
 from service.presenters.response import response_document, sampled_response_document
 from service.presenters.simulation import simulation_document
+from service.reading import JsonRoute
 from service.routes.controllers import ControllerName, Point
 from service.routes.designs import DesignId
 from service.schemas import requirement_answers as answers
@@ -40,7 +41,7 @@ from service.state import ALWAYS_HEAVY, HEAVY, DesignsHere, SettingsHere
 #: Samples of the simulations that requirements are taken of.
 SIMULATED_SAMPLES = 501
 
-router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}", tags=["controllers"])
+router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}", tags=["controllers"], route_class=JsonRoute)
 
 
 class WantedResponse(BaseModel):

@@ -141,11 +141,13 @@ class Links(Answer):
     cross_flight: dict[str, str]
     robust_performance: dict[str, str]
     worst_case: dict[str, str]
-    simultaneous_margins: dict[str, str] = Field(description="This and the four below: of state feedback")
+    simultaneous_margins: dict[str, str] = Field(description="This and the six below: of state feedback")
     norms: dict[str, str]
     phase_plane: dict[str, str]
     power_comparison: dict[str, str]
     sample_time_sweep: dict[str, str]
+    weight_search: dict[str, str] = Field(description="This and the one below: to be posted to")
+    trade_off: dict[str, str]
     gains: dict[str, str]
     actuation_comparison: str
     schedules: dict[str, dict[str, str]]

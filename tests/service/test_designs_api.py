@@ -195,7 +195,15 @@ def test_links_lead_somewhere(client: TestClient, design: dict[str, Any]) -> Non
     followed = [links["self"], links["points"].format(index=0), links["actuation_comparison"]]
     followed += [path for files in links["schedules"].values() for path in files.values()]
     for what, addresses in links.items():
-        if what in ("self", "points", "schedules", "power_comparison", "actuation_comparison"):
+        if what in (
+            "self",
+            "points",
+            "schedules",
+            "power_comparison",
+            "actuation_comparison",
+            "weight_search",
+            "trade_off",
+        ):
             continue
         assert set(addresses) <= {"nf", "pf", "lqr"}
         followed += [path + queries.get(what, "") for path in addresses.values()]

@@ -44,6 +44,8 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/actuator-requirements"),
         ("post", "/v1/designs/{id}/controllers/{name}/response"),
         ("post", "/v1/designs/{id}/controllers/{name}/actuator-requirements"),
+        ("post", "/v1/designs/{id}/controllers/{name}/weight-search"),
+        ("post", "/v1/designs/{id}/controllers/{name}/trade-off"),
         ("get", "/v1/designs/{id}/controllers/{name}/frequency-response"),
         ("get", "/v1/designs/{id}/controllers/{name}/cross-flight"),
         ("get", "/v1/designs/{id}/controllers/{name}/robust-performance"),
@@ -88,7 +90,7 @@ def test_every_body_example_runs(client: TestClient, document: dict[str, Any]) -
             assert response.status_code in (200, 201), (path, name, response.text)
             assert str(response.status_code) in operation["responses"]
             ran.append((path, name))
-    assert len(ran) == 28
+    assert len(ran) == 31
 
 
 @pytest.mark.usefixtures("shown")
@@ -120,7 +122,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 37
+    assert checked == 39
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
