@@ -115,6 +115,43 @@ def _similarity() -> Examples:
     }
 
 
+def _actuator_selection() -> Examples:
+    small = {
+        "name": "small",
+        "stall_torque_n_m": 0.15,
+        "no_load_rate_deg_s": 30000.0,
+        "continuous_torque_n_m": 0.05,
+        "power_w": 80.0,
+        "rotor_inertia_kg_m2": 1e-6,
+        "gear_ratio": {"low": 1.0, "high": 60.0},
+        "efficiency": 0.9,
+    }
+    large = {
+        "name": "large",
+        "stall_torque_n_m": 0.5,
+        "no_load_rate_deg_s": 25000.0,
+        "rotor_inertia_kg_m2": 2e-5,
+        "gear_ratio": [5.0, 10.0, 20.0],
+    }
+    doublet = {"kind": "doublet", "aileron_deg": 5.0, "length_s": 0.2}
+    wanted = {"actuator": "tab", "candidates": [small, large], "feed_back_inertia": True}
+    loads = {"system_factor": 1.25, "ground_gust": None}
+    on_doublet = {"actuator": "tab", "candidates": [small], "manoeuvre": doublet, "duration_s": 1.0}
+    return {
+        "tab": _shown("two candidates for the tab, their rotors fed back", wanted),
+        "doublet": _shown("one candidate, on a doublet, no ground gust", on_doublet | {"load_cases": loads}),
+    }
+
+
+def _inverse_sizing() -> Examples:
+    rate = {"actuator": "tab", "limits": {"rate_deg_s": 250.0}}
+    torque = {"actuator": "tab", "limits": {"torque_n_m": 0.12, "deflection_deg": 20.0}}
+    return {
+        "rate": _shown("a slower tab actuator", rate),
+        "torque": _shown("a weaker one", torque),
+    }
+
+
 def _shown(summary: str, value: dict[str, Any]) -> dict[str, Any]:
     return {"summary": summary, "value": value}
 
@@ -175,6 +212,8 @@ def _trade_offs() -> Examples:
 
 BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/designs": _designs,
+    "/v1/designs/{id}/controllers/{name}/actuator-selection": _actuator_selection,
+    "/v1/designs/{id}/controllers/{name}/inverse-sizing": _inverse_sizing,
     "/v1/hinge-moments": _hinge_moments,
     "/v1/linear-models": _linear_models,
     "/v1/eigenvalue-sweeps": _eigenvalue_sweeps,

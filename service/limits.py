@@ -37,9 +37,10 @@ LIMITS = {
     "max_sweep_models": "1",
     "max_flown_loops": "1",
     "max_delayed_loops": "1",
+    "max_actuator_candidates": "1",
+    "max_manoeuvre_stretches": "1",
     "max_swept_samples": "1",
     "max_step_samples": "1",
-    "max_flown_knots": "1",
     "max_simulated_steps": "1",
     "max_worst_case_rows": "1",
     "max_compared_samples": "1",
@@ -164,6 +165,23 @@ def check_design(request: DesignRequest, settings: Settings) -> None:
     check_size("/grid", what, searches, "max_tab_only_designs", settings)
 
 
+#: Stretches that a period of a sine counts for.
+_STRETCHES = 8
+
+
+def check_manoeuvre(manoeuvre: Manoeuvre, duration: float, flights: int, settings: Settings) -> None:
+    """Refuse a manoeuvre of too many knots and periods for as many flights: grid points, of each design that flies it.
+
+    Raises
+    ------
+    LimitExceeded
+    """
+    periods = int(min(manoeuvre.omega * duration / 6.0, 1e9))
+    stretches = (len(manoeuvre.times) + _STRETCHES * periods) * flights
+    what = f"stretches: grid points times knots and {_STRETCHES} for each period of a sine, of every design"
+    check_size("/manoeuvre", what, stretches, "max_manoeuvre_stretches", settings)
+
+
 def check_steps(
     pointer: str,
     loop: Loop,
@@ -184,7 +202,7 @@ def check_steps(
     ------
     LimitExceeded
     """
-    check_size("/manoeuvre", "knots of the manoeuvre", len(manoeuvre.times), "max_flown_knots", settings)
+    check_manoeuvre(manoeuvre, asked.duration, 1, settings)
     steps = np.minimum(simulation_steps(loop, manoeuvre, asked), LARGEST_COUNT)
     work = times * int(steps.sum() + 100 * steps.max(initial=0))
     what = "steps of the simulation: of all points, and 100 times those of the point with most"

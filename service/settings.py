@@ -40,6 +40,13 @@ class Settings(BaseSettings):
         description="Loops flown away from their design: pairs of points, or grid points times perturbed plants",
     )
     max_delayed_loops: int = Field(default=2000, ge=1, description="The same, of controllers with transport delays")
+    max_actuator_candidates: int = Field(default=100, ge=1, description="Candidates for one actuator")
+    max_manoeuvre_stretches: int = Field(
+        default=50_000,
+        ge=1,
+        description="Stretches of a manoeuvre: grid points times knots, and eight for each period of a sine, of every "
+        "design that flies it",
+    )
     max_swept_samples: int = Field(
         default=500_000,
         ge=1,
@@ -48,9 +55,6 @@ class Settings(BaseSettings):
     )
     max_step_samples: int = Field(
         default=20_000, ge=1, description="The same, of the step at one grid point and sample time"
-    )
-    max_flown_knots: int = Field(
-        default=100_000, ge=1, description="Grid points times knots of a manoeuvre whose requirements are asked for"
     )
     max_simulated_steps: int = Field(
         default=5_000_000,

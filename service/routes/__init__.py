@@ -2,6 +2,7 @@
 
 from service.routes import (
     actuation_comparison,
+    actuator_sizing,
     atmosphere,
     controllers,
     cross_flight,
@@ -38,6 +39,7 @@ ROUTERS = (
     controllers.router,
     requirements.router,
     limited_tab.router,
+    actuator_sizing.router,
     frequency_response.router,
     cross_flight.router,
     robust_performance.router,

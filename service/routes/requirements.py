@@ -22,7 +22,7 @@ from schedules.requirements import requirements, simulated
 from schedules.study import Reference
 from service.answering import answer, encode
 from service.designs import continuous_loop, controller_of, point_with_gains
-from service.limits import check_size, check_steps
+from service.limits import check_manoeuvre, check_size, check_steps
 from service.lqr_studies import refused_by_the_domain
 from service.manoeuvre_of import manoeuvre_of, simulation_of
 from service.openapi import BODY, problems
@@ -119,7 +119,7 @@ def response_to_manoeuvre(
     manoeuvre = manoeuvre_of(body.manoeuvre, loop.references)
     document: dict[str, Any] = {"name": name, "point": body.point, "manoeuvre": body.manoeuvre.normalised()}
     if body.nonlinear is None:
-        check_size("/manoeuvre", "knots of the manoeuvre", len(manoeuvre.times), "max_flown_knots", settings)
+        check_manoeuvre(manoeuvre, body.duration_s, 1, settings)
         linear = manoeuvre_response(loop, manoeuvre, body.duration_s, body.samples)
         said = {"kind": "linear", **response_document(linear), "simulation": None}
     else:
@@ -148,9 +148,7 @@ def requirements_of_manoeuvre(
     controller = controller_of(envelope, name)
     loop = continuous_loop(controller)
     manoeuvre = manoeuvre_of(body.manoeuvre, loop.references)
-    points = int(controller.outcomes.ok.sum())
-    work = points * len(manoeuvre.times)
-    check_size("/manoeuvre", "grid points times knots of the manoeuvre", work, "max_flown_knots", settings)
+    check_manoeuvre(manoeuvre, body.duration_s, int(controller.outcomes.ok.sum()), settings)
     nonlinear = None
     if body.nonlinear is not None:
         asked = simulation_of(body.nonlinear, envelope.study, body.duration_s, SIMULATED_SAMPLES)

@@ -210,7 +210,7 @@ def test_sampled_state_feedback_has_no_manoeuvres(client: TestClient, refused: C
 
 
 def test_limits_name_themselves(tmp_path: Any, refused: Callable[..., dict[str, Any]]) -> None:
-    settings = Settings(data_dir=tmp_path, max_flown_knots=30, max_simulated_steps=100_000)
+    settings = Settings(data_dir=tmp_path, max_manoeuvre_stretches=30, max_simulated_steps=100_000)
     with TestClient(create_app(settings)) as small:
         here = f"/v1/designs/{small.post('/v1/designs', json=example('wind_tunnel')).json()['id']}/controllers/nf"
         times = [0.1 * k for k in range(40)]
@@ -218,7 +218,7 @@ def test_limits_name_themselves(tmp_path: Any, refused: Callable[..., dict[str, 
         body = {"manoeuvre": series, "duration_s": 1.0}
         for what, more in (("response", {"point": 0}), ("actuator-requirements", {})):
             problem = refused(small.post(f"{here}/{what}", json=body | more), 422)
-            assert (problem["code"], "max_flown_knots" in problem["detail"]) == ("limit_exceeded", True)
+            assert (problem["code"], "max_manoeuvre_stretches" in problem["detail"]) == ("limit_exceeded", True)
         body = {"manoeuvre": STEP, "duration_s": 1.0, "nonlinear": {}}
         problem = refused(small.post(f"{here}/actuator-requirements", json=body), 422)
         assert (problem["code"], "max_simulated_steps" in problem["detail"]) == ("limit_exceeded", True)
