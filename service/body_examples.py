@@ -156,7 +156,6 @@ def _shown(summary: str, value: dict[str, Any]) -> dict[str, Any]:
     return {"summary": summary, "value": value}
 
 
-#: Path -> its examples, by name.
 def _requirements() -> Examples:
     rate_limited = {
         "manoeuvre": {"kind": "step", "aileron_deg": 10.0, "rate_limit_deg_s": 60.0}, "duration_s": 1.0,
@@ -203,6 +202,25 @@ def _weight_searches() -> Examples:
     }
 
 
+def _flight_profiles() -> Examples:
+    profile = {
+        "times_s": [0.0, 1.0, 2.5],
+        "altitude_m": [0.0, 500.0, 2500.0],
+        "dynamic_pressure_pa": [300.0, 1200.0, 700.0],
+    }
+    doublet = {"kind": "doublet", "aileron_deg": 5.0, "length_s": 0.5}
+    body = {"profile": profile, "manoeuvre": doublet, "duration_s": 3.0, "samples": 151}
+    held = {"times_s": [0.0, 2.0], "altitude_m": [1000.0, 1000.0], "airspeed_m_s": [30.0, 50.0]}
+    step = {"kind": "step", "aileron_deg": 5.0}
+    return {
+        "climb": _shown("a doublet while climbing and speeding up", body),
+        "held_trim": _shown(
+            "a step while speeding up, the controller knowing the first trim only",
+            body | {"profile": held, "manoeuvre": step, "duration_s": 2.0, "trim": "held", "estimate_error": True},
+        ),
+    }
+
+
 def _trade_offs() -> Examples:
     specs = {"settling_time_s_max": 0.3, "overshoot_percent_max": 5.0, "damping_ratio_min": 0.5}
     searched = ["tab_rate_deg_s", "aileron_rate_deg_s", "aileron_integral_deg_s", "aileron_torque_n_m"]
@@ -210,6 +228,7 @@ def _trade_offs() -> Examples:
     return {"one_point": _shown("from the fastest to 0.3 s, by four of the weights", wanted)}
 
 
+#: Path -> its examples, by name.
 BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/designs": _designs,
     "/v1/designs/{id}/controllers/{name}/actuator-selection": _actuator_selection,
@@ -223,4 +242,5 @@ BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/designs/{id}/controllers/{name}/actuator-requirements": _requirements,
     "/v1/designs/{id}/controllers/{name}/weight-search": _weight_searches,
     "/v1/designs/{id}/controllers/{name}/trade-off": _trade_offs,
+    "/v1/designs/{id}/controllers/{name}/flight-profile": _flight_profiles,
 }

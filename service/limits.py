@@ -45,6 +45,7 @@ LIMITS = {
     "max_worst_case_rows": "1",
     "max_compared_samples": "1",
     "max_weight_searches": "1",
+    "max_profile_steps": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
 }

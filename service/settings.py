@@ -78,6 +78,12 @@ class Settings(BaseSettings):
         ge=1,
         description="Searches of weights: grid points, of a trade-off times its settling times",
     )
+    max_profile_steps: int = Field(
+        default=400_000,
+        ge=1,
+        description="Steps of a flight over a profile: 20 times as many with a table of hinge moments, 3 times with an "
+        "estimate of the error",
+    )
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

@@ -48,6 +48,7 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("post", "/v1/designs/{id}/controllers/{name}/trade-off"),
         ("post", "/v1/designs/{id}/controllers/{name}/actuator-selection"),
         ("post", "/v1/designs/{id}/controllers/{name}/inverse-sizing"),
+        ("post", "/v1/designs/{id}/controllers/{name}/flight-profile"),
         ("get", "/v1/designs/{id}/controllers/{name}/frequency-response"),
         ("get", "/v1/designs/{id}/controllers/{name}/cross-flight"),
         ("get", "/v1/designs/{id}/controllers/{name}/robust-performance"),
@@ -92,7 +93,7 @@ def test_every_body_example_runs(client: TestClient, document: dict[str, Any]) -
             assert response.status_code in (200, 201), (path, name, response.text)
             assert str(response.status_code) in operation["responses"]
             ran.append((path, name))
-    assert len(ran) == 35
+    assert len(ran) == 37
 
 
 @pytest.mark.usefixtures("shown")
@@ -124,7 +125,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 41
+    assert checked == 42
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
