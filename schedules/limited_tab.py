@@ -16,6 +16,10 @@ from schedules.requirements import simulated
 from schedules.study import Reference
 
 
+#: Of the integration: a curve is read off a plot.
+TOLERANCE = 1e-4
+
+
 @dataclass(frozen=True, eq=False)
 class LimitedTab:
     """Figures of the design's reference, simulated with the tab's deflection limited, each (*G, L) over L limits.
@@ -44,7 +48,7 @@ class LimitedTab:
 
 def limited_tab_request(reference: Reference, limit: float) -> SimulationRequest:
     """The simulation of one limit [rad] of the tab's deflection, and no other."""
-    return SimulationRequest(reference.duration, limits={"tab": ActuatorLimits(deflection=limit)})
+    return SimulationRequest(reference.duration, tolerance=TOLERANCE, limits={"tab": ActuatorLimits(deflection=limit)})
 
 
 def limited_tab(

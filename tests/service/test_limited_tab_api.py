@@ -30,7 +30,7 @@ def test_less_tab_leaves_more_to_the_aileron(client: TestClient) -> None:
         "manoeuvre": {"kind": "step", "aileron_deg": 10.0}, "duration_s": 1.0, "nonlinear": {"limits": False},
     }  # fmt: skip
     free = client.post(f"{here}/actuator-requirements", json=body).json()["nonlinear"]
-    np.testing.assert_allclose(peak[..., -1], free["actuators"]["aileron"]["peak_torque_n_m"], rtol=1e-9)
+    np.testing.assert_allclose(peak[..., -1], free["actuators"]["aileron"]["peak_torque_n_m"], rtol=1e-3)
     rms = np.array(found["points"]["aileron_rms_torque_n_m"])
     assert np.all(rms[..., 0] > rms[..., -1])
     # Held all but still, the tab leaves the torque that holds the aileron: stiffness of the linear model at the end.
