@@ -15,7 +15,6 @@ from schedules.designed import DesignedController
 from schedules.requirements import simulated
 from schedules.study import Reference
 
-
 #: Of the integration: a curve is read off a plot.
 TOLERANCE = 1e-4
 

@@ -139,12 +139,18 @@ def _at_some_gains(study: Study, plant: PlantEnvelope, designed: DesignedControl
     return np.concatenate(each, axis=-1)
 
 
+def _values_at(plant: PlantEnvelope, points: IntArray) -> FloatArray:
+    """Values of the terms (P, T) at flat points inside the model: outside of it they need not exist."""
+    inside = plant.grid.condition.take(np.unravel_index(points, plant.outcomes.ok.shape))
+    return term_values(plant.system, inside)
+
+
 def _plant_changes(
     study: Study, plant: PlantEnvelope, reference: LinearModel, points: IntArray, found: Variants
 ) -> str | None:
     """Why the plant is not affine over the envelope, in words; None where its own models are."""
-    values = term_values(plant.system, plant.grid.condition).reshape(-1, len(TERMS))
-    ratios = values[points] / values[points[0]]
+    values = _values_at(plant, points)
+    ratios = values / values[0]
     rows = len(found.factors)
     apart = misfit(
         reference.take(np.repeat(np.arange(rows), len(points))),
@@ -177,7 +183,7 @@ def _between(study: Study, plant: PlantEnvelope, points: IntArray) -> float:
     if condition.mach.size == 0:
         return 0.0
     first = np.unravel_index(points[:1], plant.outcomes.ok.shape)
-    start = term_values(plant.system, plant.grid.condition.take(first))
+    start = _values_at(plant, points[:1])
     ratios = term_values(plant.system, condition) / start
     return misfit(
         plant.model.take(first).take(np.zeros(len(ratios), dtype=int)), ratios, linearise(plant.system, condition, held)
@@ -208,7 +214,7 @@ def _taken_apart(
     for row, monomial in enumerate([*singles, *pairs], start=1 + len(terms)):
         gains[row, list(monomial)] = unit[list(monomial)]
     loops = _assembled(study, plant, designed, reference, names, ratios, gains)
-    values = term_values(plant.system, plant.grid.condition).reshape(-1, len(TERMS))[point, : len(terms)]
+    values = _values_at(plant, np.array([point]))[0, : len(terms)]
     whole, halved = loops[:, :1], loops[:, 1 : 1 + len(terms)]
     parts = 2.0 * (whole - halved)
     plants = np.concatenate([whole - np.sum(parts, axis=1, keepdims=True), parts / values[:, None, None]], axis=1)
@@ -234,16 +240,13 @@ def _loop_differs(
     points: IntArray,
 ) -> str | None:  # fmt: skip
     """Why the sum of the parts is not the loop, in words; None where it is, at the grid and at random."""
-    values = term_values(plant.system, plant.grid.condition).reshape(-1, len(TERMS))
-    gains = made.tables.reshape(-1, len(made.gains))
-    apart = _apart(
-        made, values[points], gains[points], designed.loop.closed.reshape(-1, made.order, made.order)[points]
-    )
+    gains, values = made.tables.reshape(-1, len(made.gains)), _values_at(plant, points)
+    apart = _apart(made, values, gains[points], designed.loop.closed.reshape(-1, made.order, made.order)[points])
     rng = np.random.default_rng(0)
     ratios, size = rng.uniform(0.25, 4.0, (TRIALS, len(TERMS))), np.nanmax(np.abs(gains), axis=0)
     tried = rng.standard_normal((TRIALS, len(made.gains))) * size
     real = _assembled(study, plant, designed, reference, made.gains, ratios, tried)
-    apart = max(apart, *(_apart(made, values[points[0]] * ratios, tried, loops, w) for w, loops in enumerate(real)))
+    apart = max(apart, *(_apart(made, values[0] * ratios, tried, loops, w) for w, loops in enumerate(real)))
     if apart > LARGEST_MISFIT:
         return (
             f"the closed loop is not a sum of matrices times flight condition or gains: off by {apart:.1e} of an entry"

@@ -16,6 +16,8 @@ from schedules.proof.cells import gains_at
 from schedules.proof.family import family
 from schedules.proof.flight_box import Flight
 from schedules.proof.flown_with import NotProvable, closed_with
+from schedules.proof.prove import prove
+from schedules.run import run
 from schedules.study import GridRequest
 from tests.schedules.flown_cases import NF_RATE, given
 
@@ -198,3 +200,15 @@ def test_a_servo_of_first_order_multiplies_gains_by_the_flight_condition(envelop
     assert isinstance(made, NotProvable)
     assert "not a sum of matrices" in made.reason
     assert made.known
+
+
+def test_points_outside_the_model_do_not_stop_the_proof_of_the_others(airliner):
+    """With a compressibility correction a grid point at Mach 1 and more has no terms."""
+    study, _ = airliner
+    grid = GridRequest((0.0, 1000.0), "dynamic_pressure", (2000.0, 4000.0, 90_000.0))
+    aerodynamics = replace(study.aerodynamics, compressibility="prandtl_glauert")
+    study = replace(study, grid=grid, aerodynamics=aerodynamics)
+    envelope = run(study)
+    found = prove(study, envelope.plant, envelope.controllers[0])
+    assert {cell.status.value for cell in found.cells if cell.index[1] == 0} == {"proved"}
+    assert {cell.status.value for cell in found.cells if cell.index[1] == 1} == {"undecided"}

@@ -1,0 +1,1 @@
+"""The smallest table: lines added where a schedule needs them, and taken away where it does not."""
