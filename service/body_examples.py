@@ -228,6 +228,11 @@ def _trade_offs() -> Examples:
     return {"one_point": _shown("from the fastest to 0.3 s, by four of the weights", wanted)}
 
 
+def _refinements() -> Examples:
+    wanted = {"fraction": 0.9, "altitude_lines": 3, "speed_lines": 6, "uniform": False}
+    return {"proved_at_90_percent": _shown("proved at 0.9 of the slowest pole's rate", wanted)}
+
+
 #: Path -> its examples, by name.
 BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/designs": _designs,
@@ -242,5 +247,6 @@ BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/designs/{id}/controllers/{name}/actuator-requirements": _requirements,
     "/v1/designs/{id}/controllers/{name}/weight-search": _weight_searches,
     "/v1/designs/{id}/controllers/{name}/trade-off": _trade_offs,
+    "/v1/designs/{id}/controllers/{name}/refinement": _refinements,
     "/v1/designs/{id}/controllers/{name}/flight-profile": _flight_profiles,
 }

@@ -46,6 +46,7 @@ LIMITS = {
     "max_compared_samples": "1",
     "max_weight_searches": "1",
     "max_profile_steps": "1",
+    "max_refined_points": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
 }

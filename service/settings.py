@@ -84,6 +84,9 @@ class Settings(BaseSettings):
         description="Steps of a flight over a profile: 20 times as many with a table of hinge moments, 3 times with an "
         "estimate of the error",
     )
+    max_refined_points: int = Field(
+        default=64, ge=4, description="Points that a refined table may have: lines of altitude times lines of speed"
+    )
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

@@ -44,6 +44,7 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/actuator-requirements"),
         ("post", "/v1/designs/{id}/controllers/{name}/response"),
         ("post", "/v1/designs/{id}/controllers/{name}/actuator-requirements"),
+        ("post", "/v1/designs/{id}/controllers/{name}/refinement"),
         ("post", "/v1/designs/{id}/controllers/{name}/weight-search"),
         ("post", "/v1/designs/{id}/controllers/{name}/trade-off"),
         ("post", "/v1/designs/{id}/controllers/{name}/actuator-selection"),
@@ -93,7 +94,7 @@ def test_every_body_example_runs(client: TestClient, document: dict[str, Any]) -
             assert response.status_code in (200, 201), (path, name, response.text)
             assert str(response.status_code) in operation["responses"]
             ran.append((path, name))
-    assert len(ran) == 37
+    assert len(ran) == 38
 
 
 @pytest.mark.usefixtures("shown")
@@ -125,7 +126,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 42
+    assert checked == 43
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(

@@ -19,7 +19,7 @@ from tests.service.openapi_examples import address, operations
 
 JSON = {"Content-Type": "application/json"}
 #: Searches take seconds; their own tests damage them.
-SEARCHES = ("weight-search", "trade-off", "inverse-sizing")
+SEARCHES = ("weight-search", "trade-off", "inverse-sizing", "refinement")
 EXAMPLES = [
     (path, shown["value"])
     for path, examples in BODIES.items()
