@@ -1,4 +1,4 @@
-"""The gain schedule: axes, gains, outcomes, the rule between the points, and where it came from."""
+"""The gain schedule: axes, gains, outcomes, the rules it is flown by, and where it came from."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from typing import Literal
 from design.gains import Gain
 from design.outcome import Outcomes
 from model.flight import GridAxis
+from schedules.rules import USUAL_RULES, ScheduleRules
 
-#: Version of the layout of every schedule file; raised when a reader of the old one would misread the new.
-SCHEMA_VERSION = 1
-
-#: The rule between the grid points, word for word as every file and answer states it.
-INTERPOLATION_RULE = "multilinear in the grid's own axes"
-OUT_OF_RANGE_RULE = "clipped to the grid's edges"
+#: Newest layout of the schedule files; raised when a reader of the old one would misread the new.
+#: A reader of version 1 takes every integrator to stand before its gain.
+SCHEMA_VERSION = 2
 SIGN_CONVENTION = (
     "angles and torques positive trailing edge up; tab angle relative to the aileron; "
     "deviations from trim; u = -K x + N r, or for the classical kinds the law given by the kind"
@@ -42,7 +40,8 @@ class GainSchedule:
     axes : one per dimension of the gains, strictly increasing breakpoints
     gains : each (*G,), nan where the outcome is not ok
     outcomes : (*G,) codes and reasons
-    law : the control law in one line, with the gains by name
+    law : the control law at a flight point in one line, with the gains by name
+    rules : between the points, outside them, and where the integrators stand
     """
 
     controller: str
@@ -52,6 +51,12 @@ class GainSchedule:
     outcomes: Outcomes
     law: str
     provenance: Provenance
+    rules: ScheduleRules = USUAL_RULES
+
+    @property
+    def schema_version(self) -> int:
+        """The oldest layout whose readers read this schedule as it is meant: files state no newer one."""
+        return SCHEMA_VERSION if self.rules.integrator_placement != "before_gain" else 1
 
     @property
     def shape(self) -> tuple[int, ...]:

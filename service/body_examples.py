@@ -221,6 +221,41 @@ def _flight_profiles() -> Examples:
     }
 
 
+def _uploaded_schedules() -> Examples:
+    document = example(NAMES[0])
+    plant_parts = ("geometry", "inertia", "aerodynamics", "atmosphere", "trim", "actuators")
+    body = {
+        "design": {part: document[part] for part in plant_parts},
+        "controller": {"kind": "negative_feedback", "rate_filter_hz": 100.0},
+    }
+    axes = [
+        {"name": "altitude_m", "values": [0.0, 3000.0]},
+        {"name": "dynamic_pressure_pa", "values": [245.0, 551.25, 1531.25]},
+    ]
+    rows = {
+        "K_d": ("s", [[0.053, 0.025, 0.0098], [0.053, 0.025, 0.0098]]),
+        "K_p": ("1", [[1.6, 0.82, 0.37], [1.5, 0.74, 0.32]]),
+        "K_i": ("1/s", [[55.0, 46.0, 47.0], [52.0, 43.0, 44.0]]),
+    }
+    table = {
+        "axes": axes,
+        "gains": [{"name": name, "unit": unit, "values": values} for name, (unit, values) in rows.items()],
+    }
+    coarse = {
+        "axes": [axes[0], {"name": "dynamic_pressure_pa", "values": [245.0, 3000.0]}],
+        "gains": [
+            {"name": name, "unit": unit, "values": [[row[0], row[-1]] for row in values]}
+            for name, (unit, values) in rows.items()
+        ],
+    }
+    return {
+        "proved": _shown("a table that holds", body | {"schedule": table, "proof": {"decay_rate_1_s": 10.0}}),
+        "refuted": _shown(
+            "stable at its four points, and not between them", body | {"schedule": coarse, "proof": {"fraction": 0.0}}
+        ),
+    }
+
+
 def _trade_offs() -> Examples:
     specs = {"settling_time_s_max": 0.3, "overshoot_percent_max": 5.0, "damping_ratio_min": 0.5}
     searched = ["tab_rate_deg_s", "aileron_rate_deg_s", "aileron_integral_deg_s", "aileron_torque_n_m"]
@@ -249,4 +284,5 @@ BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/designs/{id}/controllers/{name}/trade-off": _trade_offs,
     "/v1/designs/{id}/controllers/{name}/refinement": _refinements,
     "/v1/designs/{id}/controllers/{name}/flight-profile": _flight_profiles,
+    "/v1/schedules/verify": _uploaded_schedules,
 }

@@ -47,6 +47,7 @@ LIMITS = {
     "max_weight_searches": "1",
     "max_profile_steps": "1",
     "max_refined_points": "1",
+    "max_proof_pieces": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
 }

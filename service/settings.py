@@ -87,6 +87,11 @@ class Settings(BaseSettings):
     max_refined_points: int = Field(
         default=64, ge=4, description="Points that a refined table may have: lines of altitude times lines of speed"
     )
+    max_proof_pieces: int = Field(
+        default=30_000,
+        ge=1,
+        description="Pieces of a proof between grid points: cells times plants times the pieces a cell may be cut into",
+    )
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

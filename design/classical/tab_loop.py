@@ -45,7 +45,7 @@ def tab_loop(
     """
     drive = tab_drive(actuator, controller.tab_command)
     plant = TabPlant.of(servo, drive, controller)
-    if controller.measured_rate and np.any(plant.rate_jump != 0.0):
+    if controller.measured_rate and np.any(np.abs(plant.rate_jump) > 0.0):
         raise ValueError(
             "an ideal tab deflection and a measured aileron rate close a loop that has no dynamics: "
             "give the servo a bandwidth or the rate a filter"

@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from schedules.files.plain_text import c_string, in_c_comment, number
-from schedules.files.words import fingerprint, identifier, require_table, words
+from schedules.files.words import fingerprint, identifier, require_multilinear, require_table, words
 from schedules.fill import FilledSchedule
-from schedules.schedule import SCHEMA_VERSION
 from schedules.wire_names import axis_name
 
 ARRAY_ORDER = "row-major: the last axis varies fastest, and all gains of a point stand together"
@@ -52,10 +51,13 @@ typedef struct {{
 
 /* What to do at a condition outside the breakpoints. */
 typedef enum {{
-    {P}_CLIP,  /* the nearest edge's gains: the rule of the schedule */
+    {P}_CLIP,  /* the nearest edge's gains */
     {P}_HOLD,  /* leave *gains as the caller had them */
     {P}_REFUSE /* leave *gains as the caller had them, and call it an error */
 }} {p}_policy;
+
+/* The rule of the schedule; with {P}_HOLD and no gains to leave, ask for {P}_CLIP. */
+#define {P}_OUT_OF_RANGE {P}_{policy}
 
 /* What {p}_evaluate answers; errors are below zero. {P}_CLIPPED and {P}_FILLED may come together, as their sum. */
 enum {{
@@ -80,7 +82,7 @@ def write_c_header(schedule: FilledSchedule) -> bytes:
 
     Raises
     ------
-    ValueError : a schedule without axes or gains, or a name that is a word of C or C++
+    ValueError : a schedule without axes or gains, one that is not multilinear, or a name that is a word of C or C++
     """
     require_c(schedule)
     p = identifier(schedule.designed.controller)
@@ -91,7 +93,7 @@ def write_c_header(schedule: FilledSchedule) -> bytes:
         f"#define {guard}",
         "",
         f"#define {p.upper()}_SCHEDULE_{fingerprint(schedule).upper()} /* the source asks for this very schedule */",
-        f"#define {p.upper()}_SCHEMA_VERSION {SCHEMA_VERSION}",
+        f"#define {p.upper()}_SCHEMA_VERSION {schedule.designed.schema_version}",
         f"#define {p.upper()}_DESIGN_ID {c_string(schedule.designed.provenance.design_id)}",
         f"#define {p.upper()}_REQUEST_DIGEST {c_string(schedule.designed.provenance.request_digest)}",
         "",
@@ -118,6 +120,7 @@ def about(schedule: FilledSchedule) -> list[str]:
 def require_c(schedule: FilledSchedule) -> None:
     """Refuse what has no place in C."""
     require_table(schedule)
+    require_multilinear(schedule, "C")
     names = [axis_name(axis) for axis in schedule.designed.axes] + [gain.name for gain in schedule.designed.gains]
     for name in names:
         if name in KEYWORDS:
@@ -145,6 +148,7 @@ def _types(schedule: FilledSchedule, p: str) -> str:
     return _TYPES.format(
         p=p,
         P=p.upper(),
+        policy=schedule.designed.rules.out_of_range.upper(),
         no_float="" if fits_float(schedule) else lost,
         axes=len(axes),
         gains=len(gains),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,8 +27,9 @@ class CheckPoint:
 def check_points(schedule: GainSchedule) -> list[CheckPoint]:
     """Grid nodes, centres of cells, and one condition beyond each edge with its gains clipped.
 
-    `schedule` has a gain at every point.
+    `schedule` has a gain at every point; whatever its rule outside them, the gains there are the edge's.
     """
+    schedule = replace(schedule, rules=replace(schedule.rules, out_of_range="clip"))
     axes = [np.asarray(axis.values, dtype=float) for axis in schedule.axes]
     middle = [0.5 * (x[0] + x[-1]) for x in axes]
     rows = [("node", row) for row in _some(axes)]

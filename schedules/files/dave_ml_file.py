@@ -1,8 +1,9 @@
 """The schedule as DAVE-ML (ANSI/AIAA S-119, function DTD 2.0): gridded tables with check cases.
 
 Variables keep the schedule's names and SI units in DAVE-ML's spelling (``N m/rad`` is ``Nm_rad``). Interpolation is
-linear and the end value is held outside, which are DAVE-ML's defaults and the schedule's rule. The static shots at
-the end are conditions with the gains that belong to them, so that any reader can check its own interpolation.
+linear and the end value is held outside, which are DAVE-ML's defaults: a schedule of other rules is refused. The
+static shots at the end are conditions with the gains that belong to them, so that any reader can check its own
+interpolation.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from xml.sax.saxutils import escape, quoteattr
 from design.gains import Gain
 from schedules.files.check_points import CheckPoint, check_points, magnitudes
 from schedules.files.plain_text import number, plain, wrapped
-from schedules.files.words import require_table, words
+from schedules.files.words import require_clip, require_multilinear, require_table, words
 from schedules.fill import FilledSchedule
 from schedules.wire_names import axis_name
 
@@ -38,9 +39,12 @@ def write_dave_ml(schedule: FilledSchedule) -> bytes:
 
     Raises
     ------
-    ValueError : a schedule without axes or gains, or names that would stand twice in the document
+    ValueError : a schedule without axes or gains, of other rules than these, or names that would stand twice in the
+        document
     """
     require_table(schedule)
+    require_multilinear(schedule, "a linear gridded table of DAVE-ML")
+    require_clip(schedule, "a linear gridded table of DAVE-ML")
     designed = schedule.designed
     gains = list(schedule.complete.gains)
     if schedule.rule is not None:

@@ -7,7 +7,7 @@ the MATLAB struct.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -16,19 +16,14 @@ from design.outcome import Outcomes
 from model.arrays import ObjectArray
 from model.flight import GridAxis
 from schedules.files.checks import require_writable
-from schedules.schedule import (
-    INTERPOLATION_RULE,
-    OUT_OF_RANGE_RULE,
-    SCHEMA_VERSION,
-    SIGN_CONVENTION,
-    GainSchedule,
-    Provenance,
-)
+from schedules.rules import INTEGRATOR_PLACEMENTS, INTERPOLATIONS, OUTS_OF_RANGE, ScheduleRules
+from schedules.schedule import SCHEMA_VERSION, SIGN_CONVENTION, GainSchedule, Provenance
 from schedules.wire_names import axis_name
 
 #: Says which product and which thing a file holds.
 FORMAT = "gainfield gain schedule"
 
+RuleName = TypeVar("RuleName", bound=str)
 Kind = Literal["negative_feedback", "positive_feedback", "lqr"]
 _PROVENANCE = ("design_id", "design_name", "request_digest", "version", "created_at")
 
@@ -38,14 +33,15 @@ def header(schedule: GainSchedule) -> dict[str, str | int]:
     provenance = {name: str(getattr(schedule.provenance, name)) for name in _PROVENANCE}
     return {
         "format": FORMAT,
-        "schema_version": SCHEMA_VERSION,
+        "schema_version": schedule.schema_version,
         **provenance,
         "controller": schedule.controller,
         "kind": schedule.kind,
         "law": schedule.law,
         "sign_convention": SIGN_CONVENTION,
-        "interpolation": INTERPOLATION_RULE,
-        "out_of_range": OUT_OF_RANGE_RULE,
+        "interpolation": INTERPOLATIONS[schedule.rules.interpolation],
+        "out_of_range": OUTS_OF_RANGE[schedule.rules.out_of_range],
+        "integrator_placement": INTEGRATOR_PLACEMENTS[schedule.rules.integrator_placement],
     }
 
 
@@ -62,13 +58,10 @@ def schedule_from(
 
     Raises
     ------
-    ValueError : not a schedule file, another schema version, a word missing or not text, another
-        rule between the points than this product's, or parts that do not fit together
+    ValueError : not a schedule file, another schema version, a word missing or not text, a rule
+        that this product does not have or that the file's version has not, or parts that do not fit together
     """
     require_format(header)
-    for name, rule in (("interpolation", INTERPOLATION_RULE), ("out_of_range", OUT_OF_RANGE_RULE)):
-        if _text(header, name) != rule:
-            raise ValueError(f"{name} is {header[name]!r}; only {rule!r} can be read")
     schedule = GainSchedule(
         controller=_text(header, "controller"),
         kind=_kind(_text(header, "kind")),
@@ -77,7 +70,11 @@ def schedule_from(
         outcomes=outcomes,
         law=_text(header, "law"),
         provenance=Provenance(**{name: _text(header, name) for name in _PROVENANCE}),
+        rules=_rules(header),
     )
+    if header["schema_version"] < schedule.schema_version:
+        placement = header["integrator_placement"]
+        raise ValueError(f"integrator_placement is {placement!r}, which schema_version 1 does not have")
     require_writable(schedule)
     return schedule
 
@@ -87,8 +84,8 @@ def require_format(header: Mapping[str, Any]) -> None:
     if header.get("format") != FORMAT:
         raise ValueError(f"not a schedule file: its format is not {FORMAT!r}")
     version = header.get("schema_version")
-    if isinstance(version, bool) or version != SCHEMA_VERSION:
-        raise ValueError(f"schema_version is {version!r}; this version reads {SCHEMA_VERSION}")
+    if isinstance(version, bool) or version not in range(1, SCHEMA_VERSION + 1):
+        raise ValueError(f"schema_version is {version!r}; this version reads 1 to {SCHEMA_VERSION}")
 
 
 def object_array(items: list[Any], shape: tuple[int, ...]) -> ObjectArray:
@@ -103,6 +100,27 @@ def _text(header: Mapping[str, Any], name: str) -> str:
     if not isinstance(value, str):
         raise ValueError(f"{name} must be text")
     return value
+
+
+def _rules(header: Mapping[str, Any]) -> ScheduleRules:
+    """The rules that the header's words stand for; older files say nothing of the integrators' place."""
+    placement = "integrator_placement"
+    given = header if placement in header else {**header, placement: INTEGRATOR_PLACEMENTS["before_gain"]}
+    return ScheduleRules(
+        _named(given, "interpolation", INTERPOLATIONS),
+        _named(given, "out_of_range", OUTS_OF_RANGE),
+        _named(given, placement, INTEGRATOR_PLACEMENTS),
+    )
+
+
+def _named(header: Mapping[str, Any], name: str, rules: Mapping[RuleName, str]) -> RuleName:
+    """Name of the rule whose words the header has."""
+    text = _text(header, name)
+    for rule, words in rules.items():
+        if words == text:
+            return rule
+    known = "; ".join(repr(words) for words in rules.values())
+    raise ValueError(f"{name} is {text!r}; there are: {known}")
 
 
 def _kind(text: str) -> Kind:

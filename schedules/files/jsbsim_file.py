@@ -2,8 +2,8 @@
 
 Put it into ``aircraft/<name>/Systems/`` and add ``<system file="wind_tunnel_nf"/>`` to the aircraft. Its first channel
 works out the grid's axes in SI from what JSBSim knows; the second looks up the gains, which are the properties
-``gainfield/<controller>/<gain>``. JSBSim's tables are linear between the breakpoints and clipped outside, as the
-schedule is.
+``gainfield/<controller>/<gain>``. JSBSim's tables are linear between the breakpoints and clipped outside: a
+schedule of other rules is refused.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from design.gains import Gain
 from model.arrays import FloatArray
 from model.flight import GridAxis
 from schedules.files.plain_text import in_xml_comment, number
-from schedules.files.words import identifier, require_table, words
+from schedules.files.words import identifier, require_clip, require_multilinear, require_table, words
 from schedules.fill import FilledSchedule
 from schedules.wire_names import axis_name
 
@@ -57,10 +57,12 @@ def write_jsbsim(schedule: FilledSchedule) -> bytes:
 
     Raises
     ------
-    ValueError : a schedule without axes or gains, with more than three axes that vary, or with an axis that JSBSim does
-        not know
+    ValueError : a schedule without axes or gains, of other rules than these, with more than three axes that vary, or
+        with an axis that JSBSim does not know
     """
     require_table(schedule)
+    require_multilinear(schedule, "JSBSim")
+    require_clip(schedule, "JSBSim")
     designed = schedule.designed
     for axis in designed.axes:
         if axis_name(axis) not in INPUTS:

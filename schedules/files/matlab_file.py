@@ -3,7 +3,7 @@
 Variables: every axis by its name with unit (``altitude_m``), every gain by its name, ``ok`` and, for an LQR,
 the matrices ``K`` and ``N``; the struct ``gainfield`` says what they are. The arrays are in ndgrid order,
 ``K_p(i, j)`` at ``altitude_m(i)`` and ``dynamic_pressure_pa(j)``, so that ``interpn(altitude_m,
-dynamic_pressure_pa, K_p, h, q)`` is the schedule's own rule once h and q are clipped to the breakpoints.
+dynamic_pressure_pa, K_p, h, q)`` is the multilinear rule once h and q are clipped to the breakpoints.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from design.gains import Gain
 from model.arrays import FloatArray, ObjectArray
 from model.linear_model import INPUTS
 from schedules.files.header import FORMAT, header, object_array, units
-from schedules.schedule import SCHEMA_VERSION, GainSchedule
+from schedules.schedule import GainSchedule
 from schedules.wire_names import axis_name
 
 ARRAY_ORDER = (
@@ -38,7 +38,7 @@ LOOKUP = (
 )
 
 #: Text of the file's first 116 bytes. The usual one holds the time of writing and the machine's system.
-_DESCRIPTION = f"MATLAB 5.0 MAT-file, {FORMAT}, schema version {SCHEMA_VERSION}"
+_DESCRIPTION = f"MATLAB 5.0 MAT-file, {FORMAT}, schema version "
 _DESCRIPTION_LENGTH = 116
 
 
@@ -61,7 +61,7 @@ def write_matlab(schedule: GainSchedule) -> bytes:
     content = io.BytesIO()
     # The stubs know of paths only; savemat writes to open files as well.
     savemat(content, variables, do_compression=True, oned_as="row", long_field_names=True)  # type: ignore[arg-type]
-    description = _DESCRIPTION.encode("ascii").ljust(_DESCRIPTION_LENGTH)
+    description = f"{_DESCRIPTION}{schedule.schema_version}".encode("ascii").ljust(_DESCRIPTION_LENGTH)
     return description + content.getvalue()[_DESCRIPTION_LENGTH:]
 
 

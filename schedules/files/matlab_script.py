@@ -17,8 +17,9 @@ from schedules.files.checks import NAME
 from schedules.files.header import header, units
 from schedules.files.matlab_file import gain_matrix, lookup_tables
 from schedules.files.plain_text import m_string, number, plain, wrapped
-from schedules.files.words import require_table, words
+from schedules.files.words import require_multilinear, require_table, words
 from schedules.fill import FilledSchedule
+from schedules.rules import OutOfRange
 from schedules.schedule import GainSchedule
 from schedules.wire_names import axis_name
 
@@ -32,10 +33,21 @@ _KEYWORDS = """
 """
 KEYWORDS = frozenset(_KEYWORDS.split())
 
-_CLIP = """\
+#: What interpn and Simulink's block have to be told, by the schedule's rules.
+_OUTSIDE: dict[OutOfRange, str] = {
+    "clip": """\
 % Outside the breakpoints the nearest edge counts. interpn answers NaN there and Simulink's block extrapolates unless
 % told otherwise: clip the coordinates first, and set the block's Extrapolation method to Clip.
-"""
+""",
+    "hold": """\
+% Outside the breakpoints the last gains that were inside are held. interpn answers NaN there and Simulink's block
+% extrapolates: neither has this rule, which is up to what calls them.
+""",
+    "refuse": """\
+% Outside the breakpoints there are no gains. interpn answers NaN there, but Simulink's block extrapolates: what calls
+% it has to refuse such coordinates.
+""",
+}
 
 
 def write_matlab_script(schedule: FilledSchedule) -> bytes:
@@ -43,14 +55,15 @@ def write_matlab_script(schedule: FilledSchedule) -> bytes:
 
     Raises
     ------
-    ValueError : a schedule without axes or gains, or a name that the script cannot use
+    ValueError : a schedule without axes or gains, one that is not multilinear, or a name that the script cannot use
     """
     require_table(schedule)
+    require_multilinear(schedule, "Simulink's lookup table")
     designed, complete = schedule.designed, schedule.complete
     names = [axis_name(axis) for axis in designed.axes] + [gain.name for gain in designed.gains]
     _require_names(names, [f"{gain.name}_lookup" for gain in designed.gains])
     lines = [f"% {name}: {plain(text)}" for name, text in words(schedule, ARRAY_ORDER)]
-    lines += ["%", *_CLIP.splitlines(), ""]
+    lines += ["%", *_OUTSIDE[designed.rules.out_of_range].splitlines(), ""]
     for axis in designed.axes:
         lines += _numbers(axis_name(axis), np.asarray(axis.values, dtype=float), axis.unit)
     for gain in complete.gains:

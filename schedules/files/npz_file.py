@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import tokenize
 import zipfile
 from typing import Any
 
@@ -22,6 +23,12 @@ from schedules.schedule import GainSchedule
 from schedules.wire_names import axis_name, inner_name
 
 ARRAY_ORDER = "dimension k of every array belongs to axis k of axes"
+
+#: What numpy and its parts raise of archives that are damaged, besides ValueError.
+_NOT_READ = (
+    OSError, EOFError, zipfile.BadZipFile, AttributeError, TypeError, NotImplementedError, SyntaxError,
+    tokenize.TokenError,
+)  # fmt: skip
 
 #: Time of every member: the earliest that the format knows. The usual one would be the time of writing.
 _TIME = (1980, 1, 1, 0, 0, 0)
@@ -57,7 +64,7 @@ def read_npz(content: bytes) -> GainSchedule:
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             arrays = {name: np.asarray(archive[name]) for name in archive.files}
-    except (OSError, EOFError, zipfile.BadZipFile, AttributeError, TypeError, NotImplementedError) as error:
+    except _NOT_READ as error:
         raise ValueError(f"not a numpy archive: {error}") from None
     try:
         about = json.loads(str(_member(arrays, "gainfield")))

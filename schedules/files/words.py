@@ -11,6 +11,7 @@ import numpy as np
 from schedules.files.csv_file import write_csv
 from schedules.files.header import header, units
 from schedules.fill import FILL_RULES, FilledSchedule
+from schedules.rules import INTERPOLATIONS, OUTS_OF_RANGE
 from schedules.schedule import GainSchedule
 from schedules.wire_names import axis_name
 
@@ -58,6 +59,36 @@ def require_table(schedule: FilledSchedule) -> None:
     """
     if not schedule.designed.axes or not schedule.designed.gains:
         raise ValueError("a schedule without axes or without gains is no table: there is nothing to look up")
+
+
+def require_multilinear(schedule: FilledSchedule, program: str) -> None:
+    """Refuse a rule between the points that the file's program would not follow.
+
+    Raises
+    ------
+    ValueError : a schedule that is not multilinear
+    """
+    rule = schedule.designed.rules.interpolation
+    if rule != "multilinear":
+        raise ValueError(
+            f"the schedule's interpolation is {rule} ({INTERPOLATIONS[rule]}), and {program} interpolates "
+            "multilinearly: its gains between the points would be others"
+        )
+
+
+def require_clip(schedule: FilledSchedule, program: str) -> None:
+    """Refuse a rule outside the points that the file's program would not follow.
+
+    Raises
+    ------
+    ValueError : a schedule that is not clipped
+    """
+    rule = schedule.designed.rules.out_of_range
+    if rule != "clip":
+        raise ValueError(
+            f"outside the grid the schedule's rule is {rule} ({OUTS_OF_RANGE[rule]}), and {program} takes the nearest "
+            "edge"
+        )
 
 
 def identifier(text: str) -> str:

@@ -75,6 +75,9 @@ class Certificate:
 
     def differs(self, schedule: GainSchedule) -> str | None:
         """Where a schedule is not the one that was proved, in words; None where it is, to the last bit."""
+        rules = schedule.rules
+        if rules.interpolation != "multilinear" or rules.integrator_placement != "before_gain":
+            return "it is not multilinear with integrators before their gains"
         if schedule.axes != self.axes:
             return "the breakpoints are others"
         tables = {gain.name: gain.values for gain in schedule.gains}

@@ -111,6 +111,7 @@ def links(ident: str, controllers: dict[str, str]) -> dict[str, Any]:
         "cross_flight": each("cross-flight"),
         "robust_performance": each("robust-performance"),
         "worst_case": each("worst-case"),
+        "hidden_coupling": each("hidden-coupling"),
         "simultaneous_margins": each("simultaneous-margins", ("lqr",)),
         "norms": each("norms", ("lqr",)),
         "phase_plane": each("phase-plane", ("lqr",)),
@@ -118,6 +119,8 @@ def links(ident: str, controllers: dict[str, str]) -> dict[str, Any]:
         "sample_time_sweep": each("sample-time-sweep", ("lqr",)),
         "weight_search": each("weight-search", ("lqr",)),
         "trade_off": each("trade-off", ("lqr",)),
+        "verification": f"{here}/verification",
+        "certificate": each("certificate"),
         "gains": each("gains"),
         "actuation_comparison": f"{here}/actuation-comparison",
         "schedules": {

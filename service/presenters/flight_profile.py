@@ -12,7 +12,7 @@ from model.actuators import ActuatorLimits
 from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.profile_response import ProfileResponse
 from schedules.requirements import actuator
-from schedules.schedule import INTERPOLATION_RULE, OUT_OF_RANGE_RULE
+from schedules.rules import INTERPOLATIONS, OUTS_OF_RANGE
 from schedules.wire_names import wire_name
 from service.presenters.simulation import LIMITED
 from service.schemas.flight_profiles import FlightProfileRequest
@@ -80,8 +80,8 @@ def flight_profile_document(
             }
             for each in found.tracking
         },
-        "rule": INTERPOLATION_RULE,
-        "out_of_range": OUT_OF_RANGE_RULE,
+        "rule": INTERPOLATIONS["multilinear"],
+        "out_of_range": OUTS_OF_RANGE["clip"],
         "steps": found.steps,
         "error_estimate": errors or None,
     }  # fmt: skip

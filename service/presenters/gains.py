@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from schedules.interpolate import Interpolated
-from schedules.schedule import INTERPOLATION_RULE, OUT_OF_RANGE_RULE, GainSchedule
+from schedules.rules import INTERPOLATIONS, OUTS_OF_RANGE
+from schedules.schedule import GainSchedule
 
 
 def gains_document(schedule: GainSchedule, coordinates: dict[str, float], found: Interpolated) -> dict[str, Any]:
@@ -19,8 +20,9 @@ def gains_document(schedule: GainSchedule, coordinates: dict[str, float], found:
         "gains": {gain.name: gain.values for gain in found.gains},
         "units": {gain.name: gain.unit for gain in found.gains},
         "clipped": bool(found.clipped),
-        "rule": INTERPOLATION_RULE,
-        "out_of_range": OUT_OF_RANGE_RULE,
+        "held": bool(found.held),
+        "rule": INTERPOLATIONS[schedule.rules.interpolation],
+        "out_of_range": OUTS_OF_RANGE[schedule.rules.out_of_range],
         "law": schedule.law,
         "reason": "a grid point that carries weight here has no gains" if missing else None,
     }

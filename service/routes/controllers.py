@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
@@ -10,7 +10,9 @@ from pydantic import BaseModel, Field
 from design.classical.controller import ClassicalController
 from schedules.designed import DesignedEnvelope
 from schedules.interpolate import interpolate
+from schedules.rules import Interpolation, OutOfRange, ScheduleRules
 from schedules.run import design_margins
+from schedules.schedule import GainSchedule
 from schedules.schedule_of import schedule_of
 from schedules.wire_names import axis_name
 from service.answering import answer, encode
@@ -43,6 +45,12 @@ class FlightConditionWanted(BaseModel):
     dynamic_pressure_pa: float | None = Field(default=None, description="When it is the grid's axis", examples=[700.0])
     airspeed_m_s: float | None = Field(default=None, description="When it is the grid's axis")
     mach: float | None = Field(default=None, description="When it is the grid's axis")
+    rule: Interpolation = Field(default="multilinear", description="Between the points")
+    out_of_range: OutOfRange = Field(
+        default="clip",
+        description="Outside them: the nearest edge's gains; the same, marked, of a controller that holds its last "
+        "ones; or none (422)",
+    )
 
 
 @router.get("/verdicts", response_model=Verdicts, responses=problems(404, 409, 503), dependencies=[HEAVY])
@@ -82,11 +90,14 @@ def gains(
     wanted: Annotated[FlightConditionWanted, Query()],
     designs: DesignsHere,
 ) -> Response:
-    """Gains at a flight condition: multilinear in the grid's own axes, clipped to its edges outside."""
+    """Gains at a flight condition, by a rule between the grid's points and one outside them."""
     envelope = designs.envelope(ident)
-    schedule = schedule_of(envelope, controller_of(envelope, name), designs.provenance(ident))
+    rules = ScheduleRules(wanted.rule, wanted.out_of_range)
+    schedule = schedule_of(envelope, controller_of(envelope, name), designs.provenance(ident), rules)
     coordinates = _coordinates(envelope, wanted)
     found = interpolate(schedule, tuple(coordinates.values()))
+    if found.refused:
+        _refuse_outside(schedule, coordinates)
     return answer(request, encode(gains_document(schedule, coordinates, found)))
 
 
@@ -98,7 +109,8 @@ def _coordinates(envelope: DesignedEnvelope, wanted: FlightConditionWanted) -> d
     InvalidRequest : an axis is missing, or one is given that the grid does not have
     """
     axes = [axis_name(axis) for axis in envelope.plant.grid.axes]
-    given = {key: value for key, value in wanted.model_dump().items() if value is not None}
+    asked = wanted.model_dump(exclude={"rule", "out_of_range"})
+    given = {key: value for key, value in asked.items() if value is not None}
     wrong = [(key, "this axis of the grid is missing") for key in axes if key not in given]
     wrong += [(key, "the grid has no such axis") for key in given if key not in axes]
     if wrong:
@@ -106,3 +118,19 @@ def _coordinates(envelope: DesignedEnvelope, wanted: FlightConditionWanted) -> d
         fields = [FieldRefusal(f"/{key}", detail, unit_of(key), allowed) for key, detail in wrong]
         raise InvalidRequest(f"{fields[0].pointer}: {fields[0].detail}", *fields)
     return {key: given[key] for key in axes}
+
+
+def _refuse_outside(schedule: GainSchedule, coordinates: dict[str, float]) -> NoReturn:
+    """Refuse coordinates beyond the breakpoints, each by its name.
+
+    Raises
+    ------
+    InvalidRequest
+    """
+    fields = []
+    for axis, (key, value) in zip(schedule.axes, coordinates.items(), strict=True):
+        low, high = axis.values[0], axis.values[-1]
+        if not low <= value <= high:
+            detail = f"{value:g} is outside the grid, and there the schedule has no gains"
+            fields.append(FieldRefusal(f"/{key}", detail, axis.unit, f">= {low!r} and <= {high!r}"))
+    raise InvalidRequest(f"{fields[0].pointer}: {fields[0].detail}", *fields)

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
 from schedules.files import FILE_FORMATS, FileFormat, FillRule, MissingGains, file_name_parts, write_schedule
+from schedules.rules import IntegratorPlacement, Interpolation, OutOfRange, ScheduleRules
 from schedules.schedule_of import schedule_of
 from service.answering import answer, download_headers
 from service.designs import controller_of
@@ -41,6 +42,11 @@ class Options(BaseModel):
         f"({_WITHOUT_MISSING}); the file names every point that was filled. Not for {_WITH_MISSING}, which say where "
         f"there is no gain",
     )
+    rule: Interpolation = Field(default="multilinear", description="Between the points")
+    out_of_range: OutOfRange = Field(default="clip", description="Outside them")
+    integrator_placement: IntegratorPlacement = Field(
+        default="before_gain", description="Where the integrators stand; both are one law while the gains stay"
+    )
 
 
 @router.get(
@@ -67,12 +73,17 @@ def download_schedule(
     form = FILE_FORMATS[suffix]
     _check_fill(form, options.fill)
     envelope = designs.envelope(ident)
-    schedule = schedule_of(envelope, controller_of(envelope, controller), designs.provenance(ident))
+    rules = ScheduleRules(options.rule, options.out_of_range, options.integrator_placement)
+    schedule = schedule_of(envelope, controller_of(envelope, controller), designs.provenance(ident), rules)
     try:
         content = write_schedule(schedule, suffix, options.fill)
     except MissingGains as missing:
         detail = f"{missing}; {_WITH_MISSING} files say where there is no gain"
         raise NoDesignAtPoint(detail) from missing
+    except ValueError as refused:  # a rule that the format has no place for
+        raise InvalidRequest(
+            str(refused), FieldRefusal("/rule", str(refused), None, "another rule or format")
+        ) from refused
     headers = download_headers(*file_name_parts(schedule, suffix), suffix=suffix)
     return answer(request, content, media_type=form.media_type, headers=headers)
 

@@ -123,7 +123,8 @@ class InterpolatedGains(Answer):
     coordinates: dict[str, float]
     gains: dict[str, float | None]
     units: dict[str, str]
-    clipped: bool
+    clipped: bool = Field(description="Outside the grid: the gains are those of the nearest edge")
+    held: bool = Field(description="Outside the grid, and a controller in flight holds its last gains instead")
     rule: str
     out_of_range: str
     law: str

@@ -141,6 +141,7 @@ class Links(Answer):
     cross_flight: dict[str, str]
     robust_performance: dict[str, str]
     worst_case: dict[str, str]
+    hidden_coupling: dict[str, str]
     simultaneous_margins: dict[str, str] = Field(description="This and the six below: of state feedback")
     norms: dict[str, str]
     phase_plane: dict[str, str]
@@ -148,6 +149,8 @@ class Links(Answer):
     sample_time_sweep: dict[str, str]
     weight_search: dict[str, str] = Field(description="This and the one below: to be posted to")
     trade_off: dict[str, str]
+    verification: str
+    certificate: dict[str, str]
     gains: dict[str, str]
     actuation_comparison: str
     schedules: dict[str, dict[str, str]]

@@ -8,7 +8,8 @@ from scipy.io import loadmat
 from schedules.files import write_schedule
 from schedules.files.matlab_file import gain_matrix
 from schedules.interpolate import interpolate
-from schedules.schedule import INTERPOLATION_RULE, OUT_OF_RANGE_RULE, SIGN_CONVENTION
+from schedules.rules import INTERPOLATIONS, OUTS_OF_RANGE
+from schedules.schedule import SIGN_CONVENTION
 
 
 def loaded(schedule, **options):
@@ -42,7 +43,7 @@ def test_struct_says_what_it_is(make_schedule):
     assert about["created_at"] == schedule.provenance.created_at
     assert (about["controller"], about["kind"], about["law"]) == ("main", "negative_feedback", schedule.law)
     assert about["sign_convention"] == SIGN_CONVENTION
-    assert (about["interpolation"], about["out_of_range"]) == (INTERPOLATION_RULE, OUT_OF_RANGE_RULE)
+    assert (about["interpolation"], about["out_of_range"]) == (INTERPOLATIONS["multilinear"], OUTS_OF_RANGE["clip"])
     assert about["axes"].tolist() == ["altitude_m", "dynamic_pressure_pa"]
     assert about["units"] == {
         "altitude_m": "m",

@@ -38,7 +38,7 @@ def test_reads_back_the_same_schedule(make_schedule, same_schedule, shape, faile
     [
         (lambda v: v.pop("gainfield"), "no struct gainfield"),
         (lambda v: v["gainfield"].update(format="x"), "its format is not"),
-        (lambda v: v["gainfield"].update(schema_version=2.0), "schema_version is 2.0"),
+        (lambda v: v["gainfield"].update(schema_version=9.0), "schema_version is 9.0"),
         (lambda v: v["gainfield"].update(units=1.0), "units must be a struct"),
         (lambda v: v["gainfield"].pop("axes"), "altitude_m has 2 numbers, the grid 1"),
         (lambda v: v.pop("K_d"), "it has no K_d"),

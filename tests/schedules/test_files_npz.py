@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from schedules.files import read_npz, write_schedule
-from schedules.schedule import INTERPOLATION_RULE, OUT_OF_RANGE_RULE, SIGN_CONVENTION
+from schedules.rules import INTERPOLATIONS, OUTS_OF_RANGE
+from schedules.schedule import SIGN_CONVENTION
 from tests.schedules.hostile_schedules import hostile
 
 SHAPES = [((), ()), ((), [()]), ((5,), [(1,)]), ((4, 6), [(0, 0), (2, 3)]), ((1, 6), []), ((2, 3, 4), [(1, 1, 1)])]
@@ -42,8 +43,8 @@ def test_numpy_reads_it_without_pickle(make_schedule):
     np.testing.assert_array_equal(arrays["ok"], schedule.outcomes.ok)
     assert arrays["outcome"].tolist() == [["ok"] * 3, ["ok", "ok", "infeasible"]]
     about = json.loads(str(arrays["gainfield"]))
-    assert (about["sign_convention"], about["interpolation"]) == (SIGN_CONVENTION, INTERPOLATION_RULE)
-    assert (about["out_of_range"], about["schema_version"]) == (OUT_OF_RANGE_RULE, 1)
+    assert (about["sign_convention"], about["interpolation"]) == (SIGN_CONVENTION, INTERPOLATIONS["multilinear"])
+    assert (about["out_of_range"], about["schema_version"]) == (OUTS_OF_RANGE["clip"], 1)
     assert about["units"]["K_i"] == "1/s"
     assert about["request_digest"] == schedule.provenance.request_digest
 
@@ -79,7 +80,7 @@ def changed(content, changes, about=None):
         ({"gainfield": np.array("{")}, None, "Expecting"),
         ({"gainfield": np.array({}, dtype=object)}, None, "allow_pickle"),
         ({}, {"format": "x"}, "its format is not"),
-        ({}, {"schema_version": 2}, "schema_version is 2"),
+        ({}, {"schema_version": 9}, "schema_version is 9"),
         ({}, {"units": None}, "units an object"),
         ({}, {"axes": "altitude_m"}, "axes must be a list"),
         ({}, {"gains": ["K_x"]}, "gains must be names that have a unit"),

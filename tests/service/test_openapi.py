@@ -55,6 +55,7 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/robust-performance"),
         ("get", "/v1/designs/{id}/controllers/{name}/worst-case"),
         ("get", "/v1/designs/{id}/controllers/{name}/worst-case/reference"),
+        ("get", "/v1/designs/{id}/controllers/{name}/hidden-coupling"),
         ("get", "/v1/designs/{id}/actuation-comparison"),
         ("get", "/v1/designs/{id}/controllers/{name}/simultaneous-margins"),
         ("get", "/v1/designs/{id}/controllers/{name}/norms"),
@@ -67,6 +68,9 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/scaling"),
         ("get", "/v1/designs/{id}/controllers/{name}/gains"),
         ("get", "/v1/designs/{id}/schedules/{controller}.{suffix}"),
+        ("get", "/v1/designs/{id}/verification"),
+        ("get", "/v1/designs/{id}/controllers/{name}/certificate"),
+        ("post", "/v1/schedules/verify"),
         ("get", "/v1/atmosphere"),
         ("post", "/v1/hinge-moments"),
         ("post", "/v1/linear-models"),
@@ -94,7 +98,7 @@ def test_every_body_example_runs(client: TestClient, document: dict[str, Any]) -
             assert response.status_code in (200, 201), (path, name, response.text)
             assert str(response.status_code) in operation["responses"]
             ran.append((path, name))
-    assert len(ran) == 38
+    assert len(ran) == 40
 
 
 @pytest.mark.usefixtures("shown")
@@ -126,7 +130,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 43
+    assert checked == 46
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(

@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from schedules.files import FILE_FORMATS, file_name, read_json, read_npz, write_schedule
+from schedules.files import FILE_FORMATS, file_name, read_csv, read_json, read_npz, write_schedule
+from schedules.rules import ScheduleRules
 from service.design_examples import design_requests
 from service.examples import example
 
@@ -114,3 +115,17 @@ def test_source_and_header_fit_under_the_names_they_are_saved_by(client: TestCli
                 command = [compiler, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-DGAINFIELD_SELF_TEST"]
                 subprocess.run([*command, saved["c"], "-o", "self_test"], cwd=tmp_path, check=True, timeout=60)
                 subprocess.run([tmp_path / "self_test"], check=True, timeout=60, stdout=subprocess.DEVNULL)
+
+
+def test_rules_travel_with_the_file_or_are_refused(client: TestClient, refused: Any) -> None:
+    """A table read back is interpolated by its own rule; formats without a place for a rule say so."""
+    design = client.post("/v1/designs", json=example("wind_tunnel")).json()
+    here = f"/v1/designs/{design['id']}/schedules/nf"
+    query = "?rule=monotone_cubic&out_of_range=hold&integrator_placement=after_gain"
+    for suffix, read in (("json", read_json), ("csv", read_csv), ("npz", read_npz)):
+        found = read(client.get(f"{here}.{suffix}{query}").content)
+        assert found.rules == ScheduleRules("monotone_cubic", "hold", "after_gain")
+    for suffix in ("c", "xml", "dml", "m"):
+        assert refused(client.get(f"{here}.{suffix}?rule=monotone_cubic"), 422)["errors"][0]["pointer"] == "/rule"
+        assert client.get(f"{here}.{suffix}").status_code == 200
+    assert refused(client.get(f"{here}.csv?rule=linear"), 422)["errors"][0]["pointer"] == "/rule"
