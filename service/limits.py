@@ -48,6 +48,8 @@ LIMITS = {
     "max_profile_steps": "1",
     "max_refined_points": "1",
     "max_proof_pieces": "1",
+    "max_cross_checks": "1",
+    "max_compared_points": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
 }

@@ -92,6 +92,10 @@ class Settings(BaseSettings):
         ge=1,
         description="Pieces of a proof between grid points: cells times plants times the pieces a cell may be cut into",
     )
+    max_cross_checks: int = Field(
+        default=40, ge=1, description="Points times controllers of a cross-check with python-control"
+    )
+    max_compared_points: int = Field(default=200, ge=1, description="Grid points that two designs are compared at")
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

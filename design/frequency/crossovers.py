@@ -13,9 +13,10 @@ import numpy as np
 
 from design.frequency.delayed import GridResponse, grid_response, real_axis_starts, unit_circle_starts
 from design.frequency.feedback import MOST_STATES, ClosedLoop, complementary, log_slope, open_loop_value
+from design.frequency.nearest import nearest_each_way
 from design.frequency.polynomials import imaginary_cross, real_cross, squared_magnitude
 from design.frequency.positive_roots import position_in_row, positive_roots
-from model.arrays import BoolArray, ComplexArray, FloatArray, GridArrays, IntArray
+from model.arrays import ComplexArray, FloatArray, GridArrays, IntArray
 
 #: A Newton step from a root of the polynomials is never longer than this part of the frequency.
 SETTLED = 1e-5
@@ -58,7 +59,7 @@ def phase_crossings(loop: ClosedLoop, found: GridResponse | None = None) -> Cros
 
     Of a sampled loop half the sampling rate is one as well, so that there are (N, n+1).
     With a delay, or more than `MOST_STATES`, (N, `SEARCHED_CROSSINGS`): those whose critical gain ratio is
-    nearest to 1.
+    nearest to 1, above and below it.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def phase_crossings(loop: ClosedLoop, found: GridResponse | None = None) -> Cros
     ratio = critical_ratio(value)
     kept = ~np.isnan(ratio)
     if loop.searched:
-        kept &= _nearest(rows, ratio, start.shape[0], width)
+        kept &= nearest_each_way(rows, ratio, start.shape[0], width)
     return _in_rows((start.shape[0], width), rows[kept], w[kept], value[kept], slope[kept])
 
 
@@ -117,14 +118,6 @@ def _polished(
         rows, w, step = rows[close], w[close], step[close]
     w = w - step
     return rows, w, *complementary(loop, rows, w, delayed)
-
-
-def _nearest(rows: IntArray, ratio: FloatArray, count: int, width: int) -> BoolArray:
-    """Mask of the `width` entries of each row (K,) whose `ratio` (K,) is nearest to 1; nan is farthest."""
-    order = np.lexsort((np.abs(np.log(ratio)), rows))
-    kept = np.empty(rows.size, dtype=bool)
-    kept[order] = position_in_row(rows, count) < width
-    return kept
 
 
 def _in_rows(

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.frequency.feedback import ClosedLoop, complementary
+from design.frequency.nearest import nearest_each_way
 from design.frequency.polynomials import evaluate, roots, squared_magnitude
 from design.frequency.positive_roots import position_in_row
 from model.arrays import ComplexArray, FloatArray, GridArrays, IntArray
@@ -110,7 +111,7 @@ def real_axis_starts(loop: ClosedLoop, found: GridResponse, width: int) -> Float
     """Frequencies (N, M) where L with its delay is real, zero first, nan padded.
 
     L is real where T is, and on the same side of the real axis elsewhere. Of each point only those with the
-    critical ratio nearest to 1 are located, `SPARE` times as many as the `width` that is asked for.
+    critical ratio nearest to 1, either way, are located, `SPARE` times as many as the `width` that is asked for.
     """
     T = found.value
     above = T.imag > 0.0
@@ -119,9 +120,8 @@ def real_axis_starts(loop: ClosedLoop, found: GridResponse, width: int) -> Float
     first, last = T[rows, place], T[rows, place + 1]
     with np.errstate(divide="ignore", invalid="ignore"):
         estimate = (first.real * last.imag - last.real * first.imag) / (last.imag - first.imag)
-        distance = np.abs(np.log(np.abs(1.0 - 1.0 / estimate)))
-    order = np.lexsort((distance, rows))
-    chosen = np.sort(order[position_in_row(rows, len(T)) < SPARE * width])
+        ratio = 1.0 - 1.0 / estimate
+    chosen = np.flatnonzero(nearest_each_way(rows, ratio, len(T), SPARE * width))
     zero = np.zeros((len(T), 1))
     return np.concatenate([zero, _located(loop, found, rows[chosen], place[chosen], "imag", 0.0)], axis=-1)
 

@@ -123,6 +123,8 @@ def links(ident: str, controllers: dict[str, str]) -> dict[str, Any]:
         "certificate": each("certificate"),
         "gains": each("gains"),
         "actuation_comparison": f"{here}/actuation-comparison",
+        "cross_check": f"{here}/cross-check",
+        "compare": f"{here}/compare",
         "schedules": {
             name: {suffix: f"{here}/schedules/{name}.{suffix}" for suffix in FILE_FORMATS} for name in controllers
         },

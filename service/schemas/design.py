@@ -153,6 +153,8 @@ class Links(Answer):
     certificate: dict[str, str]
     gains: dict[str, str]
     actuation_comparison: str
+    cross_check: str
+    compare: str
     schedules: dict[str, dict[str, str]]
 
 

@@ -189,12 +189,13 @@ def test_links_lead_somewhere(client: TestClient, design: dict[str, Any]) -> Non
         ("root_locus", "response", "frequency_response", "simultaneous_margins", "norms", "phase_plane"), "?point=0"
     )
     queries |= {
+        "cross_check": "?points=0",
         "gains": "?altitude_m=0&dynamic_pressure_pa=500",
         "sample_time_sweep": "?from_s=0.001&to_s=0.002&count=2",
     }
     posted = {"weight_search", "trade_off"}
     plain = [what for what, there in links.items() if isinstance(there, str)]
-    followed = [links[what].format(index=0) for what in plain]
+    followed = [links[what].format(index=0) + queries.get(what, "") for what in plain]
     followed += [path for files in links["schedules"].values() for path in files.values()]
     for what in links.keys() - {*plain, "schedules", "power_comparison"} - posted:
         assert set(links[what]) <= {"nf", "pf", "lqr"}

@@ -57,6 +57,8 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/worst-case/reference"),
         ("get", "/v1/designs/{id}/controllers/{name}/hidden-coupling"),
         ("get", "/v1/designs/{id}/actuation-comparison"),
+        ("get", "/v1/designs/{id}/cross-check"),
+        ("get", "/v1/designs/{id}/compare"),
         ("get", "/v1/designs/{id}/controllers/{name}/simultaneous-margins"),
         ("get", "/v1/designs/{id}/controllers/{name}/norms"),
         ("get", "/v1/designs/{id}/controllers/{name}/phase-plane"),
@@ -130,7 +132,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 46
+    assert checked == 48
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
