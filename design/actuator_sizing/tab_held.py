@@ -14,8 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from design.estimation.readings import padded
 from design.loop import Loop
+from design.padded import padded
 from model.lag_states import LAG_STATES
 from model.linear_model import LinearModel
 

@@ -29,10 +29,10 @@ from design.estimation.readings import (
     delay_states,
     is_controllers,
     left_disturbances,
-    padded,
     refuse_unless_full_state,
 )
 from design.loop import Loop
+from design.padded import padded
 from model.arrays import FloatArray
 
 #: States of a model of a delay that the gains know nothing of: right to 1e-6 up to ``omega delay`` of 1, 4e-3 up to 3.

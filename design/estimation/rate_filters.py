@@ -21,10 +21,10 @@ from design.estimation.readings import (
     is_controllers,
     known_points,
     left_disturbances,
-    padded,
     refuse_unless_full_state,
 )
 from design.loop import Loop
+from design.padded import padded
 from model.arrays import FloatArray, Floats
 from model.lag_states import LAG_STATES
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from design.loop import Loop
-from model.arrays import BoolArray, FloatArray
+from model.arrays import BoolArray
 
 #: Angles that are measured, and the rate that belongs to each.
 RATES: dict[str, str] = {"dt": "dt_rate", "da": "da_rate"}
@@ -65,10 +65,3 @@ def left_disturbances(loop: Loop) -> tuple[str, ...]:
     """Names of the disturbances that are left when rates are not measured."""
     gone = {f"{rate}_noise" for rate in RATES.values()}
     return tuple(name for name in loop.disturbances if name not in gone)
-
-
-def padded(matrix: FloatArray, rows: int, columns: int) -> FloatArray:
-    """`matrix` (*G, r, c) with rows and columns of zeros behind its own, always a copy."""
-    made = np.zeros((*matrix.shape[:-2], rows, columns))
-    made[..., : matrix.shape[-2], : matrix.shape[-1]] = matrix
-    return made

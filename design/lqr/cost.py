@@ -10,6 +10,7 @@ from design.lqr.output_weights import OutputWeights, check_output_weights, outpu
 from design.lqr.power_weights import NetWorkWeights, PlainWeights, PowerBalancedWeights, Weights, largest_price
 from design.lqr.tracking import TrackingPlant
 from design.lqr.weights import WeightName, WeightsRefused, check_weights, weight_matrices
+from design.padded import padded
 from model.arrays import BoolArray, FloatArray, IntArray, ObjectArray
 
 #: A price above the largest admissible one by this part of it is so by rounding.
@@ -80,10 +81,10 @@ def _plain(weights: PlainWeights, plant: TrackingPlant) -> Cost:
     _check_size("R", given.R, [(2, 2)], plant)
     if given.N is not None:
         _check_size("N", given.N, [(k, 2) for k in n], plant)
-    Q = _padded(given.Q, len(states), len(states))
-    padded = None if given.N is None else _padded(given.N, len(states), 2)
-    check_weights(Q, given.R, padded)
-    return Cost(Q, given.R, padded)
+    Q = padded(given.Q, len(states), len(states))
+    cross = None if given.N is None else padded(given.N, len(states), 2)
+    check_weights(Q, given.R, cross)
+    return Cost(Q, given.R, cross)
 
 
 def _check_size(name: WeightName, matrix: FloatArray, allowed: list[tuple[int, int]], plant: TrackingPlant) -> None:
@@ -96,13 +97,6 @@ def _check_size(name: WeightName, matrix: FloatArray, allowed: list[tuple[int, i
         over += f", or only {' '.join(least)} of the states"
     expected = " or ".join(str(shape) for shape in dict.fromkeys(reversed(allowed)))
     raise WeightsRefused(name, None, f"{name} has shape {matrix.shape}: expected {expected}, over {over}")
-
-
-def _padded(matrix: FloatArray, rows: int, columns: int) -> FloatArray:
-    """`matrix` with rows and columns of zeros behind its own."""
-    whole = np.zeros((rows, columns))
-    whole[: matrix.shape[0], : matrix.shape[1]] = matrix
-    return whole
 
 
 def _with_price(cost: Cost, weights: NetWorkWeights, plant: TrackingPlant) -> Cost:

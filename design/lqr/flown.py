@@ -10,6 +10,7 @@ from design.delay.pade import delay_chain
 from design.loop import Loop
 from design.lqr.structures import Structure
 from design.lqr.tracking import TrackingPlant, augment_with_integral
+from design.padded import padded
 from model.arrays import FloatArray
 from model.linear_model import LinearModel
 
@@ -37,8 +38,8 @@ def flown_loop(model: LinearModel, structure: Structure, K: FloatArray, N: Float
     (C, D, offset), (G, M) = _outputs(model, plant), _disturbances(plant, K)
     grid, o, n, m = plant.A.shape[:-2], C.shape[-2], K.shape[-1], len(INPUTS)
     loop = Loop(
-        A=_padded(plant.A, n, n), B=_padded(plant.B, n, m), E=_padded(plant.E, n, N.shape[-1]), K=K, N=N, M=M,
-        G=_padded(G, n, G.shape[-1]), C=_padded(C, o, n), F=np.zeros((*grid, o, n)), D=D, H=np.zeros((*grid, o, m)),
+        A=padded(plant.A, n, n), B=padded(plant.B, n, m), E=padded(plant.E, n, N.shape[-1]), K=K, N=N, M=M,
+        G=padded(G, n, G.shape[-1]), C=padded(C, o, n), F=np.zeros((*grid, o, n)), D=D, H=np.zeros((*grid, o, m)),
         offset=offset, states=structure.states(model.states), inputs=INPUTS, references=structure.references,
         outputs=(*ANGLES_AND_RATES, *TORQUES, *_commands(structure)), disturbances=DISTURBANCES, stages=(),
         delay=tuple(drive.delay for drive in structure.drives),
@@ -104,12 +105,3 @@ def _with_chains(loop: Loop, structure: Structure) -> Loop:
         E[..., held, :] += b * loop.N[..., command, None, :]
         G[..., held, :] += b * loop.M[..., command, None, :]
     return replace(loop, A=A, E=E, G=G)
-
-
-def _padded(matrix: FloatArray, rows: int, columns: int) -> FloatArray:
-    """`matrix` (*G, r, c) with rows and columns of zeros behind its own."""
-    if matrix.shape[-2:] == (rows, columns):
-        return matrix
-    whole = np.zeros((*matrix.shape[:-2], rows, columns))
-    whole[..., : matrix.shape[-2], : matrix.shape[-1]] = matrix
-    return whole

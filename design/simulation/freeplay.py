@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from design.loop import Loop
+from design.padded import padded
 from design.simulation.request import Freeplay
 from model.arrays import FloatArray
 from model.linear_model import LinearModel
@@ -35,7 +36,7 @@ def with_link(loop: Loop, model: LinearModel, freeplay: Freeplay) -> Loop:
     states, n = (*names, "dt", "dt_rate"), len(names)
     inertia, air, at = model.inertia, model.air_torque, states.index
     grid, size = loop.A.shape[:-2], n + 2
-    A, B = _padded(loop.A, size, size), _padded(loop.B, size, 1)
+    A, B = padded(loop.A, size, size), padded(loop.B, size, 1)
     surfaces, aileron = [at(name) for name in model.states], at("da_rate")
     A[..., aileron, :], B[..., aileron, :] = 0.0, 0.0
     A[..., aileron, surfaces] = air[..., 1, :] / inertia[..., 1, 1, None]
@@ -55,8 +56,8 @@ def with_link(loop: Loop, model: LinearModel, freeplay: Freeplay) -> Loop:
     A[..., n + 1, :] /= inertia[..., 0, 0, None]
     B[..., n + 1, :] /= inertia[..., 0, 0, None]
     outputs, o = (*loop.outputs, *ACTUATOR.values()), len(loop.outputs)
-    C, F = (_padded(matrix, o + 2, size) for matrix in (loop.C, loop.F))
-    D, H = (_padded(matrix, o + 2, 1) for matrix in (loop.D, loop.H))
+    C, F = (padded(matrix, o + 2, size) for matrix in (loop.C, loop.F))
+    D, H = (padded(matrix, o + 2, 1) for matrix in (loop.D, loop.H))
     offset = np.concatenate([loop.offset, np.zeros((*grid, 2))], axis=-1)
     for row, (own, moved) in enumerate(ACTUATOR.items(), start=o):
         source = loop.outputs.index(own)
@@ -65,8 +66,8 @@ def with_link(loop: Loop, model: LinearModel, freeplay: Freeplay) -> Loop:
         C[..., source, at(own)] = 1.0
         offset[..., outputs.index(moved)] = loop.offset[..., source]
     return replace(
-        loop, A=A, B=B, E=_padded(loop.E, size, loop.E.shape[-1]), G=_padded(loop.G, size, loop.G.shape[-1]),
-        K=_padded(loop.K, 1, size), C=C, F=F, D=D, H=H, offset=offset, states=states, outputs=outputs, stages=(),
+        loop, A=A, B=B, E=padded(loop.E, size, loop.E.shape[-1]), G=padded(loop.G, size, loop.G.shape[-1]),
+        K=padded(loop.K, 1, size), C=C, F=F, D=D, H=H, offset=offset, states=states, outputs=outputs, stages=(),
     )  # fmt: skip
 
 
@@ -80,10 +81,3 @@ def link_torque(freeplay: Freeplay, stretch: FloatArray, rate: FloatArray) -> Fl
     beyond = stretch - np.clip(stretch, -0.5 * freeplay.gap, 0.5 * freeplay.gap)
     bears = np.where(beyond != 0.0, freeplay.damping, 0.0) if freeplay.gap > 0.0 else freeplay.damping
     return np.asarray(freeplay.stiffness * beyond + bears * rate)
-
-
-def _padded(matrix: FloatArray, rows: int, columns: int) -> FloatArray:
-    """`matrix` (*G, r, c) with rows and columns of zeros behind its own."""
-    whole = np.zeros((*matrix.shape[:-2], rows, columns))
-    whole[..., : matrix.shape[-2], : matrix.shape[-1]] = matrix
-    return whole
