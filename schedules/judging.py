@@ -62,11 +62,11 @@ def judged(
         return DesignedController(request, outcomes, gains, loop, None, none.astype(complex), none, ())
     step, duration = study.reference.sizes(loop.references), horizon(study, request)
     try:
-        found = _on_manoeuvre(study, loop.take(ok), _assessed(request, loop.take(ok), step, duration)).spread(ok)
+        found = _assessed(study, request, loop.take(ok), step, duration).spread(ok)
         fastest = _fastest_mode(request, loop, ok)
         checked = _certify(outcomes, found, _steering(request), gains, plant)
     except np.linalg.LinAlgError as error:
-        checked = _without_unjudgeable(outcomes, request, loop, step, duration, str(error))
+        checked = _without_unjudgeable(study, outcomes, request, loop, step, duration, str(error))
     if not np.array_equal(checked.ok, ok):
         kept = loop.take(checked.ok).spread(checked.ok)
         return judged(study, plant, request, checked, _kept(gains, checked), kept)
@@ -81,16 +81,18 @@ def figures_at(study: Study, request: Controller, loop: Loop, where: BoolArray) 
     """The loop's figures at the points of a mask, in one row; None where their numbers cannot be judged together."""
     step, duration = study.reference.sizes(loop.references), horizon(study, request)
     try:
-        return _assessed(request, loop.take(where), step, duration)
+        return _assessed(study, request, loop.take(where), step, duration)
     except np.linalg.LinAlgError:
         return None
 
 
-def _assessed(request: Controller, loop: Loop | CodedLoop, step: FloatArray, duration: float) -> Assessment:
-    """Figures of a loop that is finite everywhere."""
+def _assessed(
+    study: Study, request: Controller, loop: Loop | CodedLoop, step: FloatArray, duration: float
+) -> Assessment:
+    """Figures of a loop that is finite everywhere; what actuators are asked for is that of the study's manoeuvre."""
     if isinstance(loop, CodedLoop):
-        return assess_sampled(loop, step, duration)
-    return assess(loop, step, duration, sampling=_sampling(request))
+        return _on_manoeuvre(study, loop, assess_sampled(loop, step, duration))
+    return _on_manoeuvre(study, loop, assess(loop, step, duration, sampling=_sampling(request)))
 
 
 def _on_manoeuvre(study: Study, loop: Loop | CodedLoop, found: Assessment) -> Assessment:
@@ -124,7 +126,13 @@ def _fastest_mode(request: Controller, loop: Loop | CodedLoop, ok: BoolArray) ->
 
 
 def _without_unjudgeable(
-    outcomes: Outcomes, request: Controller, loop: Loop | CodedLoop, step: FloatArray, duration: float, together: str
+    study: Study,
+    outcomes: Outcomes,
+    request: Controller,
+    loop: Loop | CodedLoop,
+    step: FloatArray,
+    duration: float,
+    together: str,
 ) -> Outcomes:
     """One point whose numbers LAPACK gives up on must not lose the others: find such points one by one.
 
@@ -133,7 +141,7 @@ def _without_unjudgeable(
     reasons = np.full(outcomes.ok.shape, None, dtype=object)
     for index in map(tuple, np.argwhere(outcomes.ok)):
         try:
-            _assessed(request, loop.take(index), step, duration)
+            _assessed(study, request, loop.take(index), step, duration)
             _fastest_mode(request, loop.take(index), np.array(True))
         except np.linalg.LinAlgError as error:
             reasons[index] = str(error)

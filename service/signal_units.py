@@ -14,6 +14,8 @@ _INSIDE = {
     "dt_rate_command": "rad/s",
     "dt_actuator": "rad",
     "dt_actuator_rate": "rad/s",
+    "tab_torque": "N m",
+    "aileron_torque": "N m",
     "T_t": "N m",
     "T_a": "N m",
     "T_t_command": "N m",

@@ -61,7 +61,7 @@ def _unit(row: str, column: str) -> str:
 def _of_signal(name: str) -> _Unit:
     if name.endswith("_rate"):
         return (1, -1, 0)
-    return (0, 0, 1) if name.startswith("T_") else (1, 0, 0)
+    return (0, 0, 1) if name.startswith("T_") or name.endswith("_torque") else (1, 0, 0)
 
 
 def _power(symbol: str, n: int) -> str:

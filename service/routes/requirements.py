@@ -79,12 +79,14 @@ def response(
     loop = controller.loop.take(index)
     document = {"name": name, "point": wanted.point, "kind": wanted.kind} | reference_document(reference, duration)
     if wanted.kind == "linear":
-        return answer(request, encode(document | _reference_response(loop, reference, duration, wanted.samples)))
+        said = _reference_response(loop, reference, duration, wanted.samples) | {"simulation": None}
+        return answer(request, encode(document | said))
     flown = continuous_loop(controller)
     manoeuvre = reference.manoeuvre(flown.references)
     asked = simulation_of(Nonlinear(), envelope.study, duration, wanted.samples)
     found = _simulated_at(envelope, controller, index, manoeuvre, asked, settings)
-    return answer(request, encode(document | response_document(found)))
+    said = response_document(found) | {"simulation": simulation_document(found, flown.inputs)}
+    return answer(request, encode(document | said))
 
 
 @router.get(

@@ -14,6 +14,9 @@ Duration = Annotated[float, Field(ge=1e-3, le=1e3)]
 Rate = Annotated[float, Field(ge=-1e5, le=1e5)]
 RateLimit = Annotated[float, Field(gt=0.0, ge=1e-3, le=1e6)]
 
+#: Two times that are not equal are this far apart [s] at least: the slope between them must be a number.
+SHORTEST_GAP = 1e-6
+
 _TAB = "The same of the tab; without effect unless the controller has the reference `aileron_and_tab`"
 
 
@@ -57,7 +60,7 @@ class Recorded(Request):
 
     kind: Literal["recorded"]
     times_s: Annotated[list[Annotated[float, Field(ge=0.0, le=1e3)]], Field(min_length=1, max_length=10_000)] = Field(
-        description="From 0, rising; two may be equal", examples=[[0.0, 0.1, 0.5]]
+        description="From 0, rising by 1e-6 at least; two may be equal", examples=[[0.0, 0.1, 0.5]]
     )
     aileron_deg: Annotated[list[SurfaceAngle], Field(min_length=1, max_length=10_000)] = Field(
         description="The aileron's reference at these times, from trim", examples=[[0.0, 4.0, -2.0]]
@@ -74,9 +77,10 @@ class Recorded(Request):
             if series is not None and len(series) != len(times):
                 raise refusal(f"{len(series)} values at {len(times)} times", f"{len(times)} numbers", at=f"/{name}")
         gaps = [after - before for before, after in pairwise(times)]
-        falling = any(gap < 0.0 for gap in gaps)
+        falling = any(gap < SHORTEST_GAP and gap != 0.0 for gap in gaps)
         if times[0] != 0.0 or falling or any(a == b == 0.0 for a, b in pairwise(gaps)):
-            raise refusal("the times do not rise from 0", "rising from 0; two may be equal", at="/times_s")
+            allowed = f"rising from 0, by {SHORTEST_GAP:g} s at least; two may be equal"
+            raise refusal("the times do not rise from 0", allowed, at="/times_s")
         return self
 
 

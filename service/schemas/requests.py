@@ -86,6 +86,16 @@ def step_longer_than_delays(controller: Lqr, actuators: Actuators, step: Referen
         )
 
 
+def step_at_once_for_samples(controller: Lqr, step: Reference) -> None:
+    """Refuse a limited rate of the reference where a sampled state feedback is to follow it."""
+    if controller.sample_time_s is not None and step.rate_limit_deg_s is not None:
+        raise refusal(
+            f"controller {controller.name} is a sampled state feedback, which is followed through a step at once",
+            "null; or no state feedback with a sample time",
+            at="/reference/rate_limit_deg_s",
+        )
+
+
 #: Most states that commands on their way from a digital controller to the surfaces may take.
 MOST_UNDER_WAY = 48
 #: Most samples of a step that is followed from sample to sample.
@@ -136,6 +146,7 @@ class DesignRequest(LinearModelsRequest):
             samples_within_reach(controller, self.actuators, self.reference, at)
             if isinstance(controller, Lqr):
                 step_longer_than_delays(controller, self.actuators, self.reference)
+                step_at_once_for_samples(controller, self.reference)
             elif controller.tab_command == "rate":
                 rate_loop_for(controller, self.actuators.tab)
             else:

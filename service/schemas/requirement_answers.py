@@ -170,18 +170,6 @@ class FlownRequirements(Answer):
     limits: dict[str, Limits]
 
 
-class Response(Answer):
-    """The response to the reference step from trim; every signal is a total, under a name that ends in its unit."""
-
-    name: str
-    point: int
-    kind: Literal["linear", "nonlinear"]
-    reference: ReferenceStep
-    time_s: list[float]
-    signals: dict[str, list[float | None]]
-    units: dict[str, str]
-
-
 class LimitsReached(Answer):
     """Whether each limit of an actuator is reached, sample by sample."""
 
@@ -215,6 +203,19 @@ class Simulation(Answer):
     energy: Energies
     anti_windup: list[PointGain]
     unenforced: list[str]
+
+
+class Response(Answer):
+    """The response to the reference step from trim; every signal is a total, under a name that ends in its unit."""
+
+    name: str
+    point: int
+    kind: Literal["linear", "nonlinear"]
+    reference: ReferenceStep
+    time_s: list[float]
+    signals: dict[str, list[float | None]]
+    units: dict[str, str]
+    simulation: Simulation | None = Field(description="null where the response is the exact linear one")
 
 
 class FlownResponse(Answer):

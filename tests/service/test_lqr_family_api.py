@@ -208,3 +208,26 @@ def test_frequencies_of_a_sampled_loop_end_at_half_the_sampling_rate(client: Tes
     above = client.get(f"/v1/designs/{design['id']}/controllers/at_500_hz/frequency-response?point=2&to={2 * nyquist}")
     assert above.status_code == 422
     assert above.json()["errors"][0]["pointer"] == "/to"
+
+
+def test_a_filter_of_a_plant_with_lags_late_torques_and_unsteady_air(client: TestClient) -> None:
+    """All that a filter can estimate besides: torques behind a lag, lag states of the circulation."""
+    document = design_requests()["lqr_measured"][1]
+    document["aerodynamics"]["damping"] = "unsteady"
+    document["grid"] = {"altitude_m": [0.0], "dynamic_pressure_pa": [980.0]}
+    for actuator in ("tab", "aileron"):
+        document["actuators"][actuator] |= {"torque_loop_bandwidth_hz": 80.0}
+    document["actuators"]["tab"]["delay_s"] = 0.0005
+    document["controllers"] = document["controllers"][:1] + document["controllers"][2:3]
+    design = client.post("/v1/designs", json=document).json()
+    point = client.get(f"/v1/designs/{design['id']}/points/0")
+    assert point.status_code == 200, point.text
+    estimated = point.json()["controllers"][1]
+    assert estimated["outcome"] == "ok", estimated["reason"]
+    found = estimated["estimation"]["filter"]["error_rms"]
+    assert {one["unit"] for one in found} == {"deg", "deg/s", "N m"}
+    assert len(found) == 8
+    assert all(one["value"] >= 0.0 for one in found)
+    units = {gain["name"]: gain["unit"] for gain in estimated["gains"]}
+    assert units["L_tab_torque_da"] == "N m/(rad s)"
+    assert units["A_dt_rate_tab_torque"] == "rad/(s^2 N m)"

@@ -67,6 +67,8 @@ def test_a_limited_rate_asks_for_less(client: TestClient, here: str) -> None:
         client.get(f"/v1/designs/{design['id']}/controllers/lqr/response?point=3&kind={kind}").json()
         for kind in ("linear", "nonlinear")
     )
+    assert one["simulation"] is None
+    assert two["simulation"]["outcome"] == "completed"
     np.testing.assert_allclose(one["signals"]["da_deg"][-1], two["signals"]["da_deg"][-1], atol=0.05)
 
 
@@ -168,6 +170,11 @@ BAD: list[tuple[str, Any, str]] = [
     ),
     (
         "response",
+        {"manoeuvre": {"kind": "recorded", "times_s": [0.0, 1e-320], "aileron_deg": [0.0, 60.0]}},
+        "/manoeuvre/times_s",
+    ),
+    (
+        "response",
         {"manoeuvre": {"kind": "recorded", "times_s": [0.0, 0.2], "aileron_deg": [0.0, 1.0, 2.0]}},
         "/manoeuvre/aileron_deg",
     ),
@@ -206,7 +213,8 @@ def test_sampled_state_feedback_has_no_manoeuvres(client: TestClient, refused: C
         assert refused(client.post(f"{address}/{what}", json=body | more), 409)["code"] == "study_not_possible"
     assert refused(client.get(f"{address}/response?point=0&kind=nonlinear"), 409)["code"] == "study_not_possible"
     document["reference"]["rate_limit_deg_s"] = 60.0
-    assert "rate" in refused(client.post("/v1/designs", json=document), 422)["detail"]
+    problem = refused(client.post("/v1/designs", json=document), 422)
+    assert problem["errors"][0]["pointer"] == "/reference/rate_limit_deg_s"
 
 
 def test_limits_name_themselves(tmp_path: Any, refused: Callable[..., dict[str, Any]]) -> None:
