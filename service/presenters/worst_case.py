@@ -36,6 +36,9 @@ _LIMITED = {
     "T_a": ("aileron", "torque"),
 }
 _REFERENCES = {"r_a": "aileron", "r_t": "tab"}
+#: Decimals of the times [s]: knots of two references that only rounding keeps apart are one, as a request wants them
+#: (`service.schemas.manoeuvres.SHORTEST_GAP`).
+_DECIMALS = 9
 #: What a recorded manoeuvre of a request may have at most (`service.schemas.manoeuvres.Recorded`).
 LONGEST_S, MOST_SAMPLES = 1e3, 10_000
 #: How long the response is followed beyond the end of the worst reference, as a part of it.
@@ -174,6 +177,10 @@ def _series(manoeuvre: Manoeuvre, limits: Admissible) -> tuple[FloatArray, Float
     values = np.repeat(manoeuvre.values, 1 + jumps, axis=0)
     before = np.flatnonzero(jumps) + np.arange(int(jumps.sum()))
     values[before] = manoeuvre.ends[np.flatnonzero(jumps) - 1]
+    times = np.round(times, _DECIMALS)
+    same = np.diff(times) == 0.0
+    ends = ~(np.append(False, same) & np.append(same, False))  # of several knots at one time
+    times, values = times[ends], values[ends]
     largest = np.rad2deg(limits.amplitude)
     return times, np.clip(np.rad2deg(values), -largest, largest)
 

@@ -15,7 +15,7 @@ Rate = Annotated[float, Field(ge=-1e5, le=1e5)]
 RateLimit = Annotated[float, Field(gt=0.0, ge=1e-3, le=1e6)]
 
 #: Two times that are not equal are this far apart [s] at least: the slope between them must be a number.
-SHORTEST_GAP = 1e-6
+SHORTEST_GAP = 1e-10
 
 _TAB = "The same of the tab; without effect unless the controller has the reference `aileron_and_tab`"
 
