@@ -19,7 +19,7 @@ from service.routes import ROUTERS
 from service.schemas.requests import DesignRequest
 from service.settings import Settings
 from service.state import State
-from service.store import DesignStore
+from service.store.store import Store
 from service.version import release
 
 
@@ -32,12 +32,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        designs = Designs(DesignStore(chosen.data_dir), chosen.kept_envelopes)
-        app.state.shared = State(chosen, designs, Semaphore(chosen.max_concurrent_designs))
+        url = chosen.database_url
+        store = Store(chosen.data_dir, None if url is None else url.get_secret_value())
+        designs = Designs(store.designs, chosen.kept_envelopes)
+        app.state.shared = State(chosen, store, designs, Semaphore(chosen.max_concurrent_designs))
         try:
             yield
         finally:
-            designs.close()
+            store.close()
 
     app = FastAPI(
         title="Gainfield",

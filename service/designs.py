@@ -31,7 +31,7 @@ from service.presenters.design import design_document
 from service.presenters.grid import grid_index
 from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound, StaleDesign, StudyNotPossible
 from service.schemas.requests import DesignRequest, LinearModelsRequest
-from service.store import DesignStore, ListedDesign, StoredDesign
+from service.store.designs import DesignStore, ListedDesign, StoredDesign
 from service.version import code_version
 
 #: Largest relative change of a gain between a stored design and the same design made again.
@@ -73,10 +73,6 @@ class Designs:
     def __init__(self, store: DesignStore, kept: int) -> None:
         self._store = store
         self._envelopes = Envelopes(kept)
-
-    def close(self) -> None:
-        """Close the store."""
-        self._store.close()
 
     def create(self, request: DesignRequest) -> tuple[StoredDesign, bool]:
         """The design of this request, and whether it is new; it is on the disk when this returns.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import Field
+from pydantic import Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
@@ -16,6 +16,7 @@ class Settings(BaseSettings):
     host: str = "127.0.0.1"
     port: int = Field(default=8000, ge=0, le=65535)
     data_dir: Path = Path("data")
+    database_url: SecretStr | None = None
     max_body_bytes: int = Field(default=1 << 20, ge=1024, description="Bytes of a request body")
     max_grid_points: int = Field(default=2500, ge=1, description="Points of a grid")
     max_controllers: int = Field(default=16, ge=1, description="Controllers of a design")

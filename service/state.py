@@ -11,6 +11,7 @@ from fastapi import Depends, Request
 
 from service.designs import Designs
 from service.settings import Settings
+from service.store.store import Store
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,7 @@ class State:
     """Made when the app starts, closed when it stops."""
 
     settings: Settings
+    store: Store
     designs: Designs
     slots: Semaphore
 

@@ -24,7 +24,8 @@ from service.designs import design_id
 from service.examples import example
 from service.schemas.requests import DesignRequest
 from service.settings import Settings
-from service.store import DesignStore, StoredDesign
+from service.store.designs import StoredDesign
+from service.store.store import Store
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -96,11 +97,11 @@ def test_a_design_of_other_code_is_read_but_not_continued(tmp_path: Path, quick:
     with TestClient(create_app(Settings(data_dir=tmp_path))) as client:
         document = client.post("/v1/designs", json=quick).json()
     document["controllers"][0]["gains"][0]["values"][0][0] *= 1 + 1e-7
-    store = DesignStore(tmp_path)
+    store = Store(tmp_path)
     old = StoredDesign(
         "0" * 32, "old", "2020-01-01T00:00:00.000Z", "0.0.1", orjson.dumps(request.normalised()), orjson.dumps(document)
     )
-    store.add(old)
+    store.designs.add(old)
     store.close()
     with TestClient(create_app(Settings(data_dir=tmp_path)), raise_server_exceptions=False) as client:
         assert client.get(f"/v1/designs/{old.id}").content == old.answer
