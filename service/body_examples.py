@@ -152,6 +152,21 @@ def _inverse_sizing() -> Examples:
     }
 
 
+def _previews() -> Examples:
+    one_point = example(NAMES[0])
+    one_point["grid"] = {"altitude_m": [0.0], "dynamic_pressure_pa": [980.0]}
+    one_point["controllers"] = [one_point["controllers"][0] | {"gains": {"K_p": 0.3, "K_d": 0.002, "K_i": 4.0}}]
+    weights = example(NAMES[0])
+    weights["controllers"] = weights["controllers"][2:]
+    looked_at = ["point", "root_locus", "response", "frequency_response"]
+    return {
+        "gains": _shown("Gains that are given, at one point", {"request": one_point, "studies": looked_at}),
+        "weights": _shown(
+            "Weights over a grid", {"request": weights, "studies": ["actuator_requirements", "response"], "point": 3}
+        ),
+    }
+
+
 def _shown(summary: str, value: dict[str, Any]) -> dict[str, Any]:
     return {"summary": summary, "value": value}
 
@@ -271,6 +286,7 @@ def _refinements() -> Examples:
 #: Path -> its examples, by name.
 BODIES: dict[str, Callable[[], Examples]] = {
     "/v1/designs": _designs,
+    "/v1/previews": _previews,
     "/v1/designs/{id}/controllers/{name}/actuator-selection": _actuator_selection,
     "/v1/designs/{id}/controllers/{name}/inverse-sizing": _inverse_sizing,
     "/v1/hinge-moments": _hinge_moments,

@@ -86,7 +86,7 @@ class Designs:
         found = self._store.get(ident)
         if found is not None:
             return found, False
-        envelope = self._envelopes.get(ident, lambda: _asked(study_of.study(request), run))
+        envelope = self._envelopes.get(ident, lambda: designed(request))
         made = _stored(ident, request, envelope)
         kept = self._store.add(made)
         return kept, kept is made
@@ -172,7 +172,7 @@ def _stored(ident: str, request: DesignRequest, envelope: DesignedEnvelope) -> S
 
 
 def _made_again(stored: StoredDesign) -> DesignedEnvelope:
-    envelope = _asked(study_of.study(DesignRequest.model_validate_json(stored.request)), run)
+    envelope = designed(DesignRequest.model_validate_json(stored.request))
     answered = orjson.loads(stored.answer)["controllers"]
     for controller, before in zip(envelope.controllers, answered, strict=True):
         if not _same_gains(controller, before["gains"]):
@@ -195,6 +195,16 @@ def _same_gains(controller: DesignedController, answered: list[dict[str, object]
 
 def _same(now: FloatArray, before: FloatArray) -> bool:
     return now.shape == before.shape and np.allclose(now, before, rtol=SAME_GAINS, atol=0.0, equal_nan=True)
+
+
+def designed(request: DesignRequest) -> DesignedEnvelope:
+    """The designed envelope of a request, which nobody keeps.
+
+    Raises
+    ------
+    InvalidRequest : as `Designs.create`
+    """
+    return _asked(study_of.study(request), run)
 
 
 def analysed(request: LinearModelsRequest) -> PlantEnvelope:

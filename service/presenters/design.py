@@ -20,12 +20,20 @@ from service.version import code_version, solver
 
 def design_document(ident: str, request: dict[str, Any], created_at: str, envelope: DesignedEnvelope) -> dict[str, Any]:
     """The answer to a design request."""
-    plant = envelope.plant
     return {
         "id": ident,
         "name": envelope.study.name,
         "request": request,
         "provenance": {"version": code_version(), "created_at": created_at, "solver": solver()},
+        **over_the_grid(envelope),
+        "links": links(ident, {one.request.name: one.request.kind for one in envelope.controllers}),
+    }
+
+
+def over_the_grid(envelope: DesignedEnvelope) -> dict[str, Any]:
+    """What was designed, over the grid."""
+    plant = envelope.plant
+    return {
         "grid": grid_document(plant.grid),
         "air": air_document(plant.grid.condition),
         "outcomes": plant.outcomes.codes,
@@ -33,7 +41,6 @@ def design_document(ident: str, request: dict[str, Any], created_at: str, envelo
         "warnings": warning_documents(envelope.warnings),
         "hinge_moment_fit": fit_document(plant.system.aerodynamics.source),
         "controllers": [_controller(controller, plant.grid.axes) for controller in envelope.controllers],
-        "links": links(ident, {one.request.name: one.request.kind for one in envelope.controllers}),
     }
 
 

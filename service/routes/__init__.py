@@ -22,6 +22,7 @@ from service.routes import (
     phase_plane,
     points,
     power_comparison,
+    previews,
     refinement,
     requirements,
     robust_performance,
@@ -40,6 +41,7 @@ from service.routes import schedules as schedule_files
 #: Every router of the API, in the order of the documentation.
 ROUTERS = (
     designs.router,
+    previews.router,
     points.router,
     root_locus.router,
     controllers.router,

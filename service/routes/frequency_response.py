@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
@@ -13,6 +13,7 @@ from design.frequency.poles import poles
 from design.frequency.sampled import sampled_poles
 from design.lqr.coded_loop import CodedLoop
 from model.arrays import ComplexArray
+from schedules.designed import DesignedEnvelope
 from service.answering import answer, encode
 from service.designs import controller_of, point_with_gains
 from service.limits import check_size
@@ -23,6 +24,7 @@ from service.routes.controllers import ControllerName, Point
 from service.routes.designs import DesignId
 from service.schemas.frequency_answers import FrequencyResponses
 from service.schemas.wire import PARAMETERS
+from service.settings import Settings
 from service.state import HEAVY, DesignsHere, SettingsHere
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/frequency-response", tags=["controllers"])
@@ -62,11 +64,22 @@ def frequency_response_of_controller(
     Transport delays are in them exactly. The loop is the one that is opened at all commands at once. Those of a sampled
     state feedback are from sample to sample, up to half the sampling rate; disturbances and noise are left out.
     """
+    return answer(request, encode(frequency_responses_at(designs.envelope(ident), name, wanted, settings)))
+
+
+def frequency_responses_at(
+    envelope: DesignedEnvelope, name: str, wanted: WantedResponses, settings: Settings
+) -> dict[str, Any]:
+    """The frequency responses of a controller at a point.
+
+    Raises
+    ------
+    Refusal : there is no such controller or point, or the frequencies cannot be had
+    """
     check_size("/count", "frequencies", wanted.count, "max_response_samples", settings)
-    envelope = designs.envelope(ident)
     controller = controller_of(envelope, name)
     loop = controller.loop.take(point_with_gains(envelope, controller, wanted.point))
-    document = {"name": name, "point": wanted.point}
+    document: dict[str, Any] = {"name": name, "point": wanted.point}
     if isinstance(loop, CodedLoop):
         found = sampled_poles(loop.closed, loop.sampling.time, max(loop.waiting, default=0)).equivalent
         found = found[np.isfinite(found)]
@@ -76,7 +89,7 @@ def frequency_response_of_controller(
         found = poles(loop.closed)
         low, high = frequency_range(found, wanted)
         responses = frequency_response_document(loop, response_frequencies(found, low, high, wanted.count))
-    return answer(request, encode(document | responses))
+    return document | responses
 
 
 def frequency_range(found: ComplexArray, wanted: WantedResponses, fastest: float = np.inf) -> tuple[float, float]:

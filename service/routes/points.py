@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
 
+from schedules.designed import DesignedEnvelope
 from service.answering import answer, encode
 from service.openapi import problems
 from service.presenters.controller import controller_document
@@ -27,10 +28,19 @@ def read_point(
     designs: DesignsHere,
 ) -> Response:
     """Air, trim, hinge moments, linear model, poles and servo-tab of the plant, and each controller at the point."""
-    envelope = designs.envelope(ident)
+    return answer(request, encode(point_document(designs.envelope(ident), index)))
+
+
+def point_document(envelope: DesignedEnvelope, index: int) -> dict[str, Any]:
+    """The plant and every controller at a flat point.
+
+    Raises
+    ------
+    NotFound : the grid has no such point
+    """
     size = envelope.plant.outcomes.codes.size
     if not 0 <= index < size:
         raise NotFound(f"there is no point {index}; the grid has points 0 to {size - 1}")
     here = grid_index(envelope.plant.grid, index)
     controllers = [controller_document(envelope, controller, here) for controller in envelope.controllers]
-    return answer(request, encode(plant_document(envelope.plant, index) | {"controllers": controllers}))
+    return plant_document(envelope.plant, index) | {"controllers": controllers}

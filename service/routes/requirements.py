@@ -70,8 +70,17 @@ def response(
     settings: SettingsHere,
 ) -> Response:
     """The response to the design's reference step at one point: every signal, trim values included."""
+    return answer(request, encode(response_at(designs.envelope(ident), name, wanted, settings)))
+
+
+def response_at(envelope: DesignedEnvelope, name: str, wanted: WantedResponse, settings: Settings) -> dict[str, Any]:
+    """The response of a controller to the design's reference at a point.
+
+    Raises
+    ------
+    Refusal : there is no such controller or point, or it asks for more samples or steps than are done
+    """
     check_size("/samples", "samples", wanted.samples, "max_response_samples", settings)
-    envelope = designs.envelope(ident)
     controller = controller_of(envelope, name)
     index = point_with_gains(envelope, controller, wanted.point)
     reference = envelope.study.reference
@@ -79,14 +88,12 @@ def response(
     loop = controller.loop.take(index)
     document = {"name": name, "point": wanted.point, "kind": wanted.kind} | reference_document(reference, duration)
     if wanted.kind == "linear":
-        said = _reference_response(loop, reference, duration, wanted.samples) | {"simulation": None}
-        return answer(request, encode(document | said))
+        return document | _reference_response(loop, reference, duration, wanted.samples) | {"simulation": None}
     flown = continuous_loop(controller)
     manoeuvre = reference.manoeuvre(flown.references)
     asked = simulation_of(Nonlinear(), envelope.study, duration, wanted.samples)
     found = _simulated_at(envelope, controller, index, manoeuvre, asked, settings)
-    said = response_document(found) | {"simulation": simulation_document(found, flown.inputs)}
-    return answer(request, encode(document | said))
+    return document | response_document(found) | {"simulation": simulation_document(found, flown.inputs)}
 
 
 @router.get(

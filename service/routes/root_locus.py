@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, Field
@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field
 from design.frequency.loci import root_locus
 from design.frequency.locus_damping import gain_at_damping
 from design.loop import Loop, SisoLoop
+from schedules.designed import DesignedEnvelope
 from service.answering import answer, encode
 from service.designs import continuous_loop, controller_of, point_with_gains
 from service.limits import check_size
@@ -20,6 +21,7 @@ from service.routes.controllers import ControllerName, Point
 from service.routes.designs import DesignId
 from service.schemas.controller_answers import RootLocus
 from service.schemas.wire import PARAMETERS
+from service.settings import Settings
 from service.state import HEAVY, DesignsHere, SettingsHere
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/root-locus", tags=["controllers"])
@@ -52,15 +54,24 @@ def root_locus_of_controller(
     settings: SettingsHere,
 ) -> Response:
     """Closed-loop poles at one point as one gain grows, the others as they are; the chosen gain is among the gains."""
+    return answer(request, encode(root_locus_at(designs.envelope(ident), name, wanted, settings)))
+
+
+def root_locus_at(envelope: DesignedEnvelope, name: str, wanted: WantedLocus, settings: Settings) -> dict[str, Any]:
+    """The root locus of a controller at a point.
+
+    Raises
+    ------
+    Refusal : there is no such controller, point or loop, or too many gains are wanted
+    """
     check_size("/count", "gains", wanted.count, "max_locus_gains", settings)
-    envelope = designs.envelope(ident)
     controller = controller_of(envelope, name)
     index = point_with_gains(envelope, controller, wanted.point)
     whole = continuous_loop(controller)
     loop = _loop(whole.take(index), wanted.loop)
     document = {"name": name, "loop": loop.name, "loops": _loop_names(whole), "point": wanted.point}
     locus, damped = root_locus(loop, count=wanted.count), gain_at_damping(loop, wanted.damping_ratio)
-    return answer(request, encode(document | root_locus_document(locus, damped, wanted.damping_ratio)))
+    return document | root_locus_document(locus, damped, wanted.damping_ratio)
 
 
 def _loop_names(loop: Loop) -> list[str]:

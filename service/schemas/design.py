@@ -158,13 +158,9 @@ class Links(Answer):
     schedules: dict[str, dict[str, str]]
 
 
-class Design(Answer):
-    """A design: gains, outcomes and verdicts over the grid."""
+class OverTheGrid(Answer):
+    """What was designed: gains, outcomes and verdicts over the grid."""
 
-    id: str
-    name: str
-    request: DesignRequest
-    provenance: Provenance
     grid: Grid
     air: GridAir
     outcomes: GridOutcomes
@@ -172,6 +168,15 @@ class Design(Answer):
     warnings: list[EnvelopeWarning]
     hinge_moment_fit: HingeMomentFit | None
     controllers: list[Controller]
+
+
+class Design(OverTheGrid):
+    """A design: gains, outcomes and verdicts over the grid, the request behind them, and links to all that is known."""
+
+    id: str
+    name: str
+    request: DesignRequest
+    provenance: Provenance
     links: Links
 
 

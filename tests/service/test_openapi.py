@@ -36,6 +36,7 @@ def shown(client: TestClient, design: dict[str, Any]) -> list[str]:
 def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
     assert {(method, path) for path, method, _ in operations(document)} == {
         ("post", "/v1/designs"),
+        ("post", "/v1/previews"),
         ("get", "/v1/designs"),
         ("get", "/v1/designs/{id}"),
         ("get", "/v1/designs/{id}/points/{index}"),
@@ -100,7 +101,7 @@ def test_every_body_example_runs(client: TestClient, document: dict[str, Any]) -
             assert response.status_code in (200, 201), (path, name, response.text)
             assert str(response.status_code) in operation["responses"]
             ran.append((path, name))
-    assert len(ran) == 40
+    assert len(ran) == 42
 
 
 @pytest.mark.usefixtures("shown")
@@ -132,7 +133,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 48
+    assert checked == 49
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
