@@ -9,6 +9,7 @@ import numpy as np
 from design.loop import Loop
 from design.response.step_metrics import StepMetrics
 from design.specs import Verdict
+from model.arrays import FloatArray
 from schedules.designed import DesignedController, DesignedEnvelope
 from service.presenters.disturbance import disturbance_documents
 from service.presenters.estimation import estimation_document
@@ -18,7 +19,7 @@ from service.presenters.reasons import reasons
 from service.presenters.riccati import riccati_document
 from service.spec_names import spec_field
 
-_NO_METRIC = {
+NO_METRIC = {
     "rise_time_s": "90 % of the change is not reached within the time the response is followed",
     "settling_time_s": "the response does not settle within the time it is followed",
     "overshoot_percent": "the response does not change in the end",
@@ -63,17 +64,22 @@ def _infeasibility(controller: DesignedController, index: tuple[int, ...]) -> di
 
 def step_document(step: StepMetrics) -> dict[str, Any]:
     """Figures of the aileron's response to the reference step; what is null is explained under `reasons`."""
-    figures = {
-        "rise_time_s": float(step.rise_time),
-        "settling_time_s": float(step.settling_time),
-        "overshoot_percent": 100.0 * float(step.overshoot),
-        "undershoot_percent": 100.0 * float(step.undershoot),
-        "peak_time_s": float(step.peak_time),
-        "steady_state_value_deg": float(np.rad2deg(step.steady_state_value)),
-        "steady_state_error_deg": float(np.rad2deg(step.steady_state_error)),
-        "bandwidth_rad_s": float(step.bandwidth),
+    figures = {name: float(value) for name, value in step_figures(step).items()}
+    return {**figures, "reasons": reasons(figures, NO_METRIC)}
+
+
+def step_figures(step: StepMetrics) -> dict[str, FloatArray]:
+    """The same over the grid (*G,); not finite where a figure does not exist."""
+    return {
+        "rise_time_s": step.rise_time,
+        "settling_time_s": step.settling_time,
+        "overshoot_percent": 100.0 * step.overshoot,
+        "undershoot_percent": 100.0 * step.undershoot,
+        "peak_time_s": step.peak_time,
+        "steady_state_value_deg": np.rad2deg(step.steady_state_value),
+        "steady_state_error_deg": np.rad2deg(step.steady_state_error),
+        "bandwidth_rad_s": step.bandwidth,
     }
-    return {**figures, "reasons": reasons(figures, _NO_METRIC)}
 
 
 def verdict_at(verdict: Verdict, index: tuple[int, ...]) -> dict[str, Any]:

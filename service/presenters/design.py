@@ -112,6 +112,7 @@ def links(ident: str, controllers: dict[str, str]) -> dict[str, Any]:
         "frequency_response": each("frequency-response"),
         "actuator_requirements": each("actuator-requirements"),
         "limited_tab": each("limited-tab"),
+        "figures": each("figures"),
         "verdicts": each("verdicts"),
         "design_margin": each("design-margin", ("negative_feedback", "positive_feedback")),
         "scaling": each("scaling"),

@@ -19,12 +19,13 @@ from service.answering import answer, encode
 from service.designs import controller_of, measuring_all
 from service.openapi import problems
 from service.presenters.design_margin import design_margin_document
+from service.presenters.figures import figures_document
 from service.presenters.gains import gains_document
 from service.presenters.scaling import scaling_document
 from service.presenters.verdicts import verdicts_document
 from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.designs import DesignId
-from service.schemas.controller_answers import DesignMargin, InterpolatedGains, Verdicts
+from service.schemas.controller_answers import DesignMargin, Figures, InterpolatedGains, Verdicts
 from service.schemas.scaling_answers import Scaling
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere
@@ -58,6 +59,13 @@ def verdicts(request: Request, ident: DesignId, name: ControllerName, designs: D
     """Every spec at every point: limit, value, distance and verdict, and where each is worst."""
     envelope = designs.envelope(ident)
     return answer(request, encode(verdicts_document(envelope, controller_of(envelope, name))))
+
+
+@router.get("/figures", response_model=Figures, responses=problems(404, 409, 503), dependencies=[HEAVY])
+def figures(request: Request, ident: DesignId, name: ControllerName, designs: DesignsHere) -> Response:
+    """Closed-loop poles, damping, margins and figures of the step at every grid point."""
+    envelope = designs.envelope(ident)
+    return answer(request, encode(figures_document(envelope, controller_of(envelope, name))))
 
 
 @router.get("/design-margin", response_model=DesignMargin, responses=problems(404, 409, 422, 503), dependencies=[HEAVY])

@@ -129,3 +129,44 @@ class InterpolatedGains(Answer):
     out_of_range: str
     law: str
     reason: str | None
+
+
+class MarginFigures(Answer):
+    """The least margins of a loop at every grid point."""
+
+    gain_margin_up_db: GridNumbers
+    gain_margin_down_db: GridNumbers
+    phase_margin_deg: GridNumbers
+    delay_margin_s: GridNumbers
+    disk_margin: GridNumbers
+    sensitivity_peak: GridNumbers
+    crossover_rad_s: GridNumbers
+
+
+class StepFigures(Answer):
+    """Figures of the aileron's response to the reference step at every grid point."""
+
+    rise_time_s: GridNumbers
+    settling_time_s: GridNumbers
+    overshoot_percent: GridNumbers
+    undershoot_percent: GridNumbers
+    peak_time_s: GridNumbers
+    steady_state_value_deg: GridNumbers
+    steady_state_error_deg: GridNumbers
+    bandwidth_rad_s: GridNumbers
+
+
+class Figures(Answer):
+    """One controller at every grid point; null where it carries no gains, or as `null_means` says."""
+
+    name: str
+    kind: Kind
+    grid: Grid
+    outcomes: GridOutcomes
+    reasons: GridReasons
+    decay_rate_1_s: GridNumbers = Field(description="Least distance of the closed-loop poles from the imaginary axis")
+    damping_ratio: GridNumbers = Field(description="Least of the closed-loop poles")
+    margins: dict[str, MarginFigures] = Field(description="By the actuator input at which the loop is cut")
+    step: StepFigures | None = Field(description="null where no point carries gains")
+    poles: list[list[list[Complex] | None]]
+    null_means: dict[str, str] = Field(description="What a null means where the controller carries gains")

@@ -135,6 +135,7 @@ class Links(Answer):
     frequency_response: dict[str, str]
     actuator_requirements: dict[str, str]
     limited_tab: dict[str, str]
+    figures: dict[str, str]
     verdicts: dict[str, str]
     design_margin: dict[str, str]
     scaling: dict[str, str]

@@ -37,6 +37,7 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
     assert {(method, path) for path, method, _ in operations(document)} == {
         ("post", "/v1/designs"),
         ("post", "/v1/previews"),
+        ("get", "/v1/designs/{id}/controllers/{name}/figures"),
         ("get", "/v1/designs"),
         ("get", "/v1/designs/{id}"),
         ("get", "/v1/designs/{id}/points/{index}"),
@@ -133,7 +134,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 49
+    assert checked == 50
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
