@@ -26,6 +26,7 @@ UNIT_SUFFIXES: dict[str, str] = {
     "1/s": "_1_s",
     "deg": "_deg",
     "deg/s": "_deg_s",
+    "deg/s^2": "_deg_s2",
     "W": "_w",
     "J": "_j",
     "dB": "_db",

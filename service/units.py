@@ -14,10 +14,23 @@ _SUFFIXES = {suffix: unit for unit, suffix in UNIT_SUFFIXES.items() if suffix} |
 
 def unit_of(field: str) -> str:
     """Unit that the name of a numeric field ends in; ``1`` when it ends in none."""
-    for sense in _SENSES:
-        field = field.removesuffix(sense)
-    endings = [suffix for suffix in _SUFFIXES if field.endswith(suffix)]
-    return _SUFFIXES[max(endings, key=len)] if endings else "1"
+    return _SUFFIXES.get(_ending(field), "1")
+
+
+def without_unit(field: str) -> str:
+    """The same name without its unit; a sense stays: ``settling_time_s_max`` becomes ``settling_time_max``."""
+    sense = _sense(field)
+    return field.removesuffix(sense).removesuffix(_ending(field)) + sense
+
+
+def _sense(field: str) -> str:
+    return next((sense for sense in _SENSES if field.endswith(sense)), "")
+
+
+def _ending(field: str) -> str:
+    """The suffix that tells the unit; nothing when there is none."""
+    field = field.removesuffix(_sense(field))
+    return max((suffix for suffix in _SUFFIXES if field.endswith(suffix)), key=len, default="")
 
 
 def state_units(schema: dict[str, Any]) -> None:

@@ -127,6 +127,7 @@ def links(ident: str, controllers: dict[str, str]) -> dict[str, Any]:
         "sample_time_sweep": each("sample-time-sweep", ("lqr",)),
         "weight_search": each("weight-search", ("lqr",)),
         "trade_off": each("trade-off", ("lqr",)),
+        "report": f"{here}/report",
         "verification": f"{here}/verification",
         "certificate": each("certificate"),
         "gains": each("gains"),

@@ -25,8 +25,8 @@ class SurfaceFigures(Answer):
     holding_torque_n_m: GridNumbers
     peak_hinge_moment_n_m: GridNumbers = Field(description="Of the air, trim included")
     peak_rate_deg_s: GridNumbers
-    peak_acceleration_deg_s2: GridNumbers = Field(json_schema_extra={"unit": "deg/s^2"})
-    rms_acceleration_deg_s2: GridNumbers = Field(json_schema_extra={"unit": "deg/s^2"})
+    peak_acceleration_deg_s2: GridNumbers
+    rms_acceleration_deg_s2: GridNumbers
     peak_power_w: GridNumbers
     rms_power_w: GridNumbers
 

@@ -150,6 +150,7 @@ class Links(Answer):
     sample_time_sweep: dict[str, str]
     weight_search: dict[str, str] = Field(description="This and the one below: to be posted to")
     trade_off: dict[str, str]
+    report: str
     verification: str
     certificate: dict[str, str]
     gains: dict[str, str]

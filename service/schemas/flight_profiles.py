@@ -111,8 +111,8 @@ class ProfileDemand(Answer):
     rms_torque_n_m: float | None
     holding_torque_n_m: float | None
     peak_rate_deg_s: float | None
-    peak_acceleration_deg_s2: float | None = Field(json_schema_extra={"unit": "deg/s^2"})
-    rms_acceleration_deg_s2: float | None = Field(json_schema_extra={"unit": "deg/s^2"})
+    peak_acceleration_deg_s2: float | None
+    rms_acceleration_deg_s2: float | None
     peak_deflection_deg: float | None
     peak_power_w: float | None
     rms_power_w: float | None

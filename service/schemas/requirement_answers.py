@@ -29,8 +29,8 @@ class Demand(Answer):
     rms_torque_n_m: GridNumbers
     holding_torque_n_m: GridNumbers
     peak_rate_deg_s: GridNumbers
-    peak_acceleration_deg_s2: GridNumbers = Field(json_schema_extra={"unit": "deg/s^2"})
-    rms_acceleration_deg_s2: GridNumbers = Field(json_schema_extra={"unit": "deg/s^2"})
+    peak_acceleration_deg_s2: GridNumbers
+    rms_acceleration_deg_s2: GridNumbers
     peak_deflection_deg: GridNumbers
     peak_power_w: GridNumbers
     rms_power_w: GridNumbers

@@ -37,6 +37,7 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
     assert {(method, path) for path, method, _ in operations(document)} == {
         ("post", "/v1/designs"),
         ("post", "/v1/previews"),
+        ("get", "/v1/designs/{id}/report"),
         ("get", "/v1/designs/{id}/controllers/{name}/figures"),
         ("get", "/v1/designs"),
         ("get", "/v1/designs/{id}"),
