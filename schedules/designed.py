@@ -88,3 +88,7 @@ class ControllerRefused(ValueError):
         super().__init__(f"controller {controller}: {refused}")
         self.controller = controller
         self.refused = refused
+
+    def __reduce__(self) -> tuple[type[ControllerRefused], tuple[str, WeightsRefused]]:
+        """Made again from what it was made of: so that it comes back from another process."""
+        return ControllerRefused, (self.controller, self.refused)

@@ -140,12 +140,11 @@ def fly(flown: BoolArray, loop_of: Callable[[IntArray], Loop], flight: Flight) -
     index = np.flatnonzero(flown)
     if not index.size:
         return _none(flown.shape)
-    _check_number(index.size, MOST_LOOPS)
+    refuse_too_many(index.size, delayed=False)
     parts = []
     for first in range(0, index.size, AT_ONCE):
         loop = loop_of(index[first : first + AT_ONCE])
-        if max(loop.delay) > SHORTEST:
-            _check_number(index.size, MOST_DELAYED_LOOPS)
+        refuse_too_many(index.size, max(loop.delay) > SHORTEST)
         parts.append(figures_of(loop, flight))
     return _joined(parts).spread(flown)
 
@@ -177,7 +176,14 @@ def _joined(parts: Sequence[FlownFigures]) -> FlownFigures:
     return FlownFigures(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def _check_number(loops: int, most: int) -> None:
+def refuse_too_many(loops: int, delayed: bool) -> None:
+    """Refuse more loops than one request may fly; fewer may have delays.
+
+    Raises
+    ------
+    ValueError : more than `MOST_LOOPS`, or with delays `MOST_DELAYED_LOOPS`
+    """
+    most = MOST_DELAYED_LOOPS if delayed else MOST_LOOPS
     if loops > most:
         raise ValueError(f"{loops} loops are too many to fly at once: at most {most}")
 

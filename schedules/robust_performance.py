@@ -9,16 +9,23 @@ from typing import Literal
 import numpy as np
 from scipy.special import betaincinv
 
-from design.loop import Loop
 from design.specs import Spec
-from model.arrays import BoolArray, FloatArray, GridArrays, IntArray
+from model.arrays import BoolArray, FloatArray, GridArrays
 from schedules.analysis import PlantEnvelope
-from schedules.carried_loop import carried_loop
 from schedules.case_statistics import Bad, Distribution, Influence, distribution_of, influence_of
 from schedules.designed import DesignedController
-from schedules.flown_figures import Flight, FlownFigures, fly, holds
+from schedules.flown_figures import Flight, FlownFigures, holds
 from schedules.judging import horizon
-from schedules.perturbations import Cases, Uncertainty, corner_cases, drawn_cases, perturbed_model
+from schedules.perturbations import Cases, Uncertainty, corner_cases, drawn_cases
+from schedules.perturbed_cases import (
+    FlownCases,
+    case_blocks,
+    cases_in_a_row,
+    flown_digest,
+    flown_factors,
+    fly_cases,
+    nominal,
+)
 from schedules.study import Study
 
 #: A figure over the cases.
@@ -171,7 +178,8 @@ def perturbed_performance(
     """Fly given cases of perturbed plants with the gains that were designed for the nominal one.
 
     Each plant is linearised afresh about the nominal trim (`schedules.perturbations`), and flown with all that the
-    design flies: actuator, filter, integral, feed-forward, delay. Neither depends on how many cases there are.
+    design flies: actuator, filter, integral, feed-forward, delay. Neither depends on how many cases there are. The
+    same answer comes of cases flown some at a time elsewhere (`flight_of`, `schedules.perturbed_cases`, `assemble`).
 
     Parameters
     ----------
@@ -187,19 +195,63 @@ def perturbed_performance(
     ValueError : too many loops (`schedules.flown_figures.MOST_LOOPS`), a spec on something that is not judged here, or
         factors that leave a mass or inertia which is not positive
     """
+    flight = flight_of(study, designed, specs, duration=duration, steps=steps, margins=margins)
+    done = [fly_cases(study, plant, designed, cases, flight, *block) for block in case_blocks(designed, cases)]
+    return assemble(study, plant, designed, cases, specs, flight, done)
+
+
+def flight_of(
+    study: Study,
+    designed: DesignedController,
+    specs: Sequence[Spec] = (),
+    *,
+    duration: float | None = None,
+    steps: bool = True,
+    margins: bool = False,
+) -> Flight:
+    """What every case is asked for, parameters as of `perturbed_performance`.
+
+    Raises
+    ------
+    ValueError : a spec on something that is not judged here
+    """
     followed = horizon(study, designed.request) if duration is None else duration
-    flight = Flight(study.reference.aileron, followed, steps, margins).judging(specs)
-    ok = designed.outcomes.ok
+    return Flight(study.reference.aileron, followed, steps, margins).judging(specs)
 
-    def flown(of: Cases) -> FlownFigures:
-        def loop_of(index: IntArray) -> Loop:
-            points = index // len(of)
-            model = perturbed_model(plant, points, of.parameters, of.factors[index % len(of)])
-            return carried_loop(study, plant, designed, model, points)
 
-        return fly(np.broadcast_to(ok[..., None], (*ok.shape, len(of))), loop_of, flight)
+def assemble(
+    study: Study,
+    plant: PlantEnvelope,
+    designed: DesignedController,
+    cases: Cases,
+    specs: Sequence[Spec],
+    flight: Flight,
+    done: Sequence[FlownCases],
+) -> RobustPerformance:
+    """The performance of all cases from pieces of them (`schedules.perturbed_cases.fly_cases`), and the nominal plant.
 
-    nominal = Cases(cases.parameters, np.ones((1, len(cases.parameters))))
-    figures = flown(cases)
+    However the cases were cut, the answer is the same to the last bit.
+
+    Parameters
+    ----------
+    study, plant, designed, cases : as the pieces were flown
+    specs : what is to be met besides being stable
+    flight : `flight_of` these specs
+    done : pieces that are all the cases together, in any order
+
+    Raises
+    ------
+    ValueError : pieces of something else, cases that are in none of them or in two
+    """
+    pieces = sorted(done, key=lambda one: one.start)
+    ends = [0, *(one.stop for one in pieces)]
+    if [one.start for one in pieces] != ends[:-1] or ends[-1] != len(cases):
+        said = ", ".join(f"{one.start} to {one.stop}" for one in pieces) or "none"
+        raise ValueError(f"cases 0 to {len(cases)} are wanted, each once: there are {said}")
+    of = flown_digest(study, designed, cases, flight)
+    if any(one.of != of for one in pieces):
+        raise ValueError("flown for another study, controller, other cases, or asked for something else")
+    figures = cases_in_a_row([one.figures for one in pieces])
+    as_modelled = flown_factors(study, plant, designed, nominal(cases), flight, slice(1)).take((..., 0))
     held = holds(figures, specs, axes_after_grid=1)
-    return RobustPerformance(cases, tuple(specs), ok, flown(nominal).take((..., 0)), figures, held)
+    return RobustPerformance(cases, tuple(specs), designed.outcomes.ok, as_modelled, figures, held)

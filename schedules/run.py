@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,28 +20,111 @@ from design.classical.tab_loop import tab_loop
 from design.gains import Gain
 from design.lqr.controller import LqrController
 from design.lqr.weights import WeightsRefused
-from design.outcome import Outcomes
+from design.outcome import Outcome, Outcomes
 from schedules.analysis import PlantEnvelope, analyse
 from schedules.designed import ControllerRefused, DesignedController, DesignedEnvelope
+from schedules.digests import study_digest
 from schedules.envelope_warnings import envelope_warnings
+from schedules.joined import joined
 from schedules.judging import figures_at, horizon, judged
+from schedules.part import Part, parts, parts_of, plant_at, request_at, requested
 from schedules.second_try import TRIES, missed_a_little
 from schedules.smoothing import smooth
 from schedules.state_feedback import state_feedback
 from schedules.study import Controller, Study
+from schedules.synthesised import PartDesign, Refused, Synthesised
 
 
-def run(study: Study) -> DesignedEnvelope:
+def run(study: Study, done: Sequence[Synthesised] = ()) -> DesignedEnvelope:
     """Design and judge every controller of a study over its grid.
+
+    Parts that are not done are synthesised here, one after the other: which ones were done elsewhere, and in what
+    order, makes no difference to the last bit.
+
+    Parameters
+    ----------
+    study : the study
+    done : parts of it that are synthesised already (`schedules.parts`), in any order
 
     Raises
     ------
-    ValueError : the grid cannot be built
+    ValueError : the grid cannot be built; or of `done`, a part of another study, one that is not among the study's
+        parts, or the same one twice
     ControllerRefused : weights that cannot work at any point
     """
-    plant = analyse(study)
-    controllers = tuple(design(study, plant, request) for request in study.controllers)
+    plant, kept = analyse(study), _kept(study, done)
+    controllers = tuple(_over_grid(study, plant, request, kept) for request in study.controllers)
     return DesignedEnvelope(study, plant, controllers, plant.warnings + envelope_warnings(study, plant, controllers))
+
+
+def _kept(study: Study, done: Sequence[Synthesised]) -> dict[Part, PartDesign]:
+    """The designs of the parts that are done; ValueError where one is not this study's."""
+    every, requests = set(parts(study)), {request.name: request for request in study.controllers}
+    digests = {
+        name: study_digest(study, requests[name]) for name in {one.part.controller for one in done} & {*requests}
+    }
+    kept: dict[Part, PartDesign] = {}
+    for one in done:
+        if one.part not in every:
+            raise ValueError(f"{one.part} is not a part of the study {study.name}")
+        if one.part in kept:
+            raise ValueError(f"{one.part} is given twice")
+        if one.study != digests[one.part.controller]:
+            raise ValueError(f"{one.part} was synthesised for another study than {study.name}")
+        kept[one.part] = one.design
+    return kept
+
+
+def _over_grid(
+    study: Study, plant: PlantEnvelope, request: Controller, kept: dict[Part, PartDesign]
+) -> DesignedController:
+    """A controller of the study over its grid: of its parts, where it has any."""
+    pieces = parts_of(study, request)
+    if not pieces:
+        return design(study, plant, request)
+    designs = [kept[part] if part in kept else designed_part(study, plant, part) for part in pieces]
+    return _smoothed(study, plant, joined(study, request, designs))
+
+
+def designed_part(study: Study, plant: PlantEnvelope, part: Part) -> PartDesign:
+    """The design of a part, one of `schedules.part.parts`, on the study's plant.
+
+    Raises
+    ------
+    ControllerRefused : weights that define no regulator; or, where the part is all of the grid, cannot work at any
+        point
+    """
+    request, shape, size = requested(study, part), plant.grid.shape, plant.outcomes.codes.size
+    if part.points.size == size:
+        return PartDesign.of(_unsmoothed(study, plant, request))
+    here, wanted = plant_at(plant, part.points), request_at(request, part.points, shape)
+    try:
+        return PartDesign.of(_unsmoothed(study, here, wanted))
+    except ControllerRefused as error:
+        return PartDesign.of(_refused_each(study, here, wanted), Refused.of(error.refused))
+
+
+def _refused_each(study: Study, plant: PlantEnvelope, request: Controller) -> DesignedController:
+    """The design of points (1, n) at none of which the weights can work, each with its own outcome and reason.
+
+    Raises
+    ------
+    ControllerRefused : the weights define no regulator, wherever it is
+    """
+    outcomes = plant.outcomes
+    for point in np.flatnonzero(outcomes.ok):
+        where = np.zeros_like(outcomes.ok)
+        where[0, point] = True
+        try:
+            alone = design(study, plant_at(plant, np.array([point])), request).outcomes
+        except ControllerRefused as error:
+            outcome, reason = Outcome.INFEASIBLE, error.refused.reason
+        else:
+            if alone.ok[0, 0]:
+                continue
+            outcome, reason = alone.codes[0, 0], str(alone.reasons[0, 0])
+        outcomes = outcomes.failing(where, outcome, lambda index, reason=reason: reason)  # type: ignore[misc]
+    return design(study, replace(plant, outcomes=outcomes), request)
 
 
 def design(study: Study, plant: PlantEnvelope, request: Controller) -> DesignedController:
@@ -50,9 +134,25 @@ def design(study: Study, plant: PlantEnvelope, request: Controller) -> DesignedC
     ------
     ControllerRefused : weights that cannot work at any point
     """
+    return _smoothed(study, plant, _unsmoothed(study, plant, request))
+
+
+def _unsmoothed(study: Study, plant: PlantEnvelope, request: Controller) -> DesignedController:
+    """The controller as every point has it for itself."""
     if isinstance(request, ClassicalController):
-        return _classical(study, plant, request)
+        found, designed = _chosen(study, plant, request)
+        return replace(designed, infeasibility=found.infeasibility)
     return _lqr(study, plant, request)
+
+
+def _smoothed(study: Study, plant: PlantEnvelope, designed: DesignedController) -> DesignedController:
+    """The controller with the smoother gains that it asks for."""
+    request = designed.request
+    if not isinstance(request, ClassicalController) or request.smoothness == 0.0 or request.all_gains_given:
+        return designed
+    smoothed = smooth(study, plant, designed)
+    flown = _flown(study, plant, request, designed.outcomes, smoothed.gains)
+    return replace(flown, infeasibility=designed.infeasibility, smoothed=smoothed)
 
 
 def design_margins(study: Study, plant: PlantEnvelope, request: ClassicalController) -> DesignMargins:
@@ -64,14 +164,6 @@ def design_margins(study: Study, plant: PlantEnvelope, request: ClassicalControl
     """
     reference = _reference(study, plant, request)
     return design_margin_sweep(plant.servo_tab, study.tab_actuator, request, reference, plant.outcomes)
-
-
-def _classical(study: Study, plant: PlantEnvelope, request: ClassicalController) -> DesignedController:
-    found, designed = _chosen(study, plant, request)
-    if request.smoothness > 0.0 and not request.all_gains_given:
-        smoothed = smooth(study, plant, designed)
-        designed = replace(_flown(study, plant, request, designed.outcomes, smoothed.gains), smoothed=smoothed)
-    return replace(designed, infeasibility=found.infeasibility)
 
 
 def _chosen(

@@ -11,8 +11,11 @@ import numpy as np  # noqa: E402
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
+# How long an example takes says more about the machine's other work than about the code.
+settings.register_profile("here", deadline=None)
+settings.load_profile("here")
 # On CI the same examples every time, so that a run says something about the change and not about the draw.
-settings.register_profile("ci", derandomize=True, print_blob=True)
+settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 if os.environ.get("CI") == "true":
     settings.load_profile("ci")
 

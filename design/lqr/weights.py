@@ -45,6 +45,10 @@ class WeightsRefused(ValueError):
         self.eigenvalue = eigenvalue
         self.reason = reason
 
+    def __reduce__(self) -> tuple[type[WeightsRefused], tuple[WeightName, complex | None, str]]:
+        """Made again from what it was made of: so that it comes back from another process."""
+        return WeightsRefused, (self.matrix, self.eigenvalue, self.reason)
+
 
 @dataclass(frozen=True)
 class BrysonWeights:
