@@ -103,6 +103,16 @@ class Designs:
             raise NotFound(f"there is no design {ident[:80]!a}")
         return found
 
+    def delete(self, ident: str) -> None:
+        """Forget a stored design.
+
+        Raises
+        ------
+        NotFound
+        """
+        if not self._store.delete(ident):
+            raise NotFound(f"there is no design {ident[:80]!a}")
+
     def page(self, limit: int, before: int | None) -> list[ListedDesign]:
         """Designs newest first, made before the one whose `seq` is given."""
         return self._store.page(limit, before)

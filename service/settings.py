@@ -17,6 +17,9 @@ class Settings(BaseSettings):
     port: int = Field(default=8000, ge=0, le=65535)
     data_dir: Path = Path("data")
     database_url: SecretStr | None = None
+    retention_days: float | None = Field(default=None, gt=0, description="Days that an unused design is kept")
+    max_stored_bytes: int | None = Field(default=None, ge=0, description="Bytes of all designs that are kept")
+    job_retention_days: float = Field(default=7.0, gt=0, description="Days that a job is kept after its end")
     max_body_bytes: int = Field(default=1 << 20, ge=1024, description="Bytes of a request body")
     max_grid_points: int = Field(default=2500, ge=1, description="Points of a grid")
     max_controllers: int = Field(default=16, ge=1, description="Controllers of a design")

@@ -99,3 +99,10 @@ def _before(cursor: str | None) -> int | None:
 def read_design(request: Request, ident: DesignId, designs: DesignsHere) -> Response:
     """The design, byte for byte as it was first answered."""
     return answer(request, designs.find(ident).answer)
+
+
+@router.delete("/{id}", status_code=204, responses=problems(404, 503))
+def delete_design(ident: DesignId, designs: DesignsHere) -> Response:
+    """Forget the design. It is gone when it has no other owner; its request, posted again, is designed again."""
+    designs.delete(ident)
+    return Response(status_code=204)

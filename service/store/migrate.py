@@ -8,14 +8,18 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Engine
+from sqlalchemy import Engine, text
 
 _STEPS = Path(__file__).with_name("migrations")
+#: Key of the lock under which PostgreSQL lets one process migrate at a time; any number that nothing else uses.
+_LOCK = 0x6761696E
 
 
 def migrate(engine: Engine) -> None:
     """Take the steps that the database has not taken, in one transaction; other processes wait meanwhile."""
     with engine.connect().execution_options(writes=True) as connection, connection.begin():
+        if engine.dialect.name == "postgresql":
+            connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
         config = _config()
         config.attributes["connection"] = connection
         command.upgrade(config, "head")

@@ -35,11 +35,15 @@ designs = Table(
     Column("created_at", Text, nullable=False),
     Column("version", Text, nullable=False),
     Column("request", LargeBinary, nullable=False),
-    Column("answer_blob", _DIGEST, nullable=False),
-    Column("parts_blob", _DIGEST),
+    Column("answer_blob", _DIGEST, nullable=False, index=True),
+    Column("parts_blob", _DIGEST, index=True),
     Column("bytes", BigInteger, nullable=False),
     Column("used_at", Double, nullable=False),
+    Index("designs_by_use", "used_at", "id", "bytes"),
 )
+
+#: One row: which store this is. The directory of the files says the same.
+identity = Table("identity", metadata, Column("id", String(32), primary_key=True))
 
 #: Who posted which design: its owners see it, in the order of their posting.
 ownerships = Table(
@@ -67,7 +71,7 @@ jobs = Table(
     Column("revision", Integer, nullable=False),
     Column("attempts", Integer, nullable=False),
     Column("result", Text),
-    Column("result_blob", _DIGEST),
+    Column("result_blob", _DIGEST, index=True),
     Column("error", Text),
     Column("created_at", Double, nullable=False),
     Column("started_at", Double),
@@ -81,7 +85,7 @@ chunks = Table(
     metadata,
     Column("job_id", String(32), ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False),
     Column("number", Integer, nullable=False),
-    Column("result_blob", _DIGEST, nullable=False),
+    Column("result_blob", _DIGEST, nullable=False, index=True),
     PrimaryKeyConstraint("job_id", "number"),
 )
 
@@ -117,6 +121,6 @@ repeated = Table(
     Column("created_at", Double, nullable=False, index=True),
     Column("status", Integer),
     Column("headers", Text),
-    Column("answer_blob", _DIGEST),
+    Column("answer_blob", _DIGEST, index=True),
     PrimaryKeyConstraint("owner", "key"),
 )

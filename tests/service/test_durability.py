@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import functools
+import http.client
+import itertools
 import json
 import os
+import random
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
+import urllib.error
 import urllib.request
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -50,19 +56,24 @@ def server(data_dir: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     )
     base = f"http://127.0.0.1:{port}"
     try:
-        deadline = time.monotonic() + 60
-        while True:
-            try:
-                call(base, "/healthz")
-                break
-            except OSError:
-                assert process.poll() is None, "the server stopped"
-                assert time.monotonic() < deadline, "the server does not answer"
-                time.sleep(0.1)
+        wait_for(base, process)
         yield base, process
     finally:
         process.kill()
         process.wait()
+
+
+def wait_for(base: str, process: subprocess.Popen[Any]) -> None:
+    """Wait until the server of a process answers."""
+    deadline = time.monotonic() + 60
+    while True:
+        try:
+            call(base, "/healthz")
+            return
+        except OSError:
+            assert process.poll() is None, "the server stopped"
+            assert time.monotonic() < deadline, "the server does not answer"
+            time.sleep(0.05)
 
 
 def call(base: str, path: str, body: Any = None) -> tuple[int, bytes]:
@@ -70,6 +81,96 @@ def call(base: str, path: str, body: Any = None) -> tuple[int, bytes]:
     request = urllib.request.Request(base + path, data=data, headers={"Content-Type": "application/json"})
     with urllib.request.urlopen(request, timeout=60) as answer:
         return answer.status, answer.read()
+
+
+def status_of(base: str, path: str, body: Any) -> int:
+    try:
+        return call(base, path, body)[0]
+    except urllib.error.HTTPError as refused:
+        with refused:
+            return refused.code
+
+
+#: Imports take most of a start: a process that has them becomes one server after the other.
+STARTS = """
+import os, sys
+import uvicorn
+from service.app import create_app
+from service.settings import Settings
+for port in sys.stdin:
+    child = os.fork()
+    if child == 0:
+        uvicorn.run(create_app(Settings()), port=int(port), log_level="critical")
+        os._exit(0)
+    print(child, flush=True)
+    os.waitpid(child, 0)
+"""
+
+
+def quick_starts(data_dir: Path, times: int) -> Iterator[tuple[str, Callable[[], None]]]:
+    """Address of a server of its own process, and what kills it; so many, one after the other."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", STARTS],
+        cwd=ROOT,
+        env=os.environ | {"GAINFIELD_DATA_DIR": str(data_dir), "OPENBLAS_NUM_THREADS": "1"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    child = 0
+    try:
+        for _ in range(times):
+            port = free_port()
+            process.stdin.write(f"{port}\n")
+            process.stdin.flush()
+            child = int(process.stdout.readline())
+            base = f"http://127.0.0.1:{port}"
+            wait_for(base, process)
+            yield base, functools.partial(os.kill, child, signal.SIGKILL)
+    finally:
+        process.kill()
+        with suppress(ProcessLookupError):
+            os.kill(child, signal.SIGKILL)
+        process.communicate()
+
+
+def test_survives_being_killed_again_and_again(tmp_path: Path, quick: Any) -> None:
+    """While others write, at random moments: every acknowledged design is there, byte for byte, and nothing torn."""
+    moments = random.Random(20_261_123)
+    acknowledged: dict[str, bytes] = {}
+
+    def posts(base: str, writer: str) -> None:
+        with suppress(OSError, http.client.HTTPException):
+            for number in itertools.count():
+                _, answered = call(base, "/v1/designs", quick | {"name": f"{writer} {number}"})
+                acknowledged[json.loads(answered)["id"]] = answered
+
+    for turn, (base, kill) in enumerate(quick_starts(tmp_path, 10)):
+        known = len(acknowledged)
+        for ident in moments.sample(sorted(acknowledged), min(known, 5)):
+            assert call(base, f"/v1/designs/{ident}") == (200, acknowledged[ident])
+        writers = [threading.Thread(target=posts, args=(base, f"{turn} {k}")) for k in range(3)]
+        for writer in writers:
+            writer.start()
+        deadline = time.monotonic() + 20
+        while len(acknowledged) < known + 3:
+            assert time.monotonic() < deadline, "nothing is acknowledged"
+            time.sleep(0.01)
+        time.sleep(moments.uniform(0.0, 0.2))
+        kill()
+        for writer in writers:
+            writer.join()
+    store = Store(tmp_path)
+    assert store.findings == ()
+    assert store.inspect(thorough=True) == ()
+    for ident, answered in acknowledged.items():
+        found = store.designs.get(ident)
+        assert found is not None
+        assert found.answer == answered
+    store.close()
 
 
 def test_survives_kill(tmp_path: Path, wanted: Any) -> None:

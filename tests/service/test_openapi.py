@@ -41,6 +41,7 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs/{id}/controllers/{name}/figures"),
         ("get", "/v1/designs"),
         ("get", "/v1/designs/{id}"),
+        ("delete", "/v1/designs/{id}"),
         ("get", "/v1/designs/{id}/points/{index}"),
         ("get", "/v1/designs/{id}/controllers/{name}/root-locus"),
         ("get", "/v1/designs/{id}/controllers/{name}/response"),
@@ -126,6 +127,8 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
     checked = 0
     for path, method, operation in operations(document):
         where, query = address(path, operation)
+        if method == "delete":
+            continue
         if method == "post":
             (example, *_) = operation["requestBody"]["content"]["application/json"]["examples"].values()
             response = client.post(where, json=example["value"])
@@ -183,7 +186,8 @@ def test_every_operation_is_described(document: dict[str, Any]) -> None:
     for path, _, operation in operations(document):
         assert operation.get("description"), path
         assert operation.get("tags"), path
-        assert operation["responses"].get("304") or operation.get("requestBody"), path
+        responses = operation["responses"]
+        assert responses.get("304") or responses.get("204") or operation.get("requestBody"), path
 
 
 def test_numbers_state_their_unit(document: dict[str, Any]) -> None:
