@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from math import ceil, prod, tau
 from typing import TypeVar
 
 import numpy as np
+import orjson
 
 from design.classical.controller import ClassicalController
 from design.lqr.controller import LqrController
@@ -17,13 +19,15 @@ from design.lqr.measurement import KalmanMeasurement, RateFilters
 from design.outcome import Outcome, Outcomes
 from model.flight import GridAxis
 from schedules.analysis import PlantEnvelope, analyse
-from schedules.designed import DesignedController
+from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.files.header import object_array
 from schedules.perturbations import MOST_CORNER_PARAMETERS, Parameter, Uncertainty
 from schedules.perturbations import PARAMETERS as UNCERTAIN
+from schedules.proof.certificate import Origin, to_document
 from schedules.proof.prove import ProofRequest, prove
 from schedules.proof.reading_error import reading_margins
 from schedules.proof.scheduling_rates import scheduling_rates
+from schedules.proof.table_proof import TableProof, table_proof
 from schedules.study import Controller, GridRequest, Reference, Study
 from schedules.uploaded_schedule import gain_units, needed_gains, on_axes, state_feedback_of, uploaded_schedule
 from schedules.wire_names import inner_name
@@ -42,6 +46,7 @@ from service.schemas.verification_requests import (
     WantedSummary,
 )
 from service.settings import Settings
+from service.version import code_version
 
 #: Work of reading errors and of rates of flight, in pieces of a cell.
 MARGIN_PIECES, RATE_PIECES = 26, 150
@@ -84,7 +89,7 @@ def _change(wanted: WantedProof, parameter: Parameter) -> float:
 def check_work(
     shape: tuple[int, ...], controllers: int, wanted: WantedProof, request: ProofRequest, settings: Settings, at: str
 ) -> None:
-    """Refuse a proof of too many pieces.
+    """Refuse a proof of too many pieces; `at` is the pointer to what decides how many.
 
     Raises
     ------
@@ -100,7 +105,7 @@ def check_work(
         f"pieces: cells times plants times the pieces a cell may be cut into, {MARGIN_PIECES} more with margins and "
         f"{RATE_PIECES} more with rates"
     )
-    check_size(f"{at}/pieces", what, cells * plants * each, "max_proof_pieces", settings)
+    check_size(at, what, cells * plants * each, "max_proof_pieces", settings)
 
 
 def verified(
@@ -120,6 +125,38 @@ def verified(
         margins=_or_why(lambda: reading_margins(proof, decay)) if wanted.margins else NOT_ASKED,
         rates=_or_why(lambda: scheduling_rates(proof, wanted.altitude_rate_m_s, decay)) if wanted.rates else NOT_ASKED,
     )
+
+
+def origin_of(designs: Designs, ident: str) -> Origin:
+    """Where the table of a stored design comes from."""
+    known = designs.provenance(ident)
+    return Origin(known.design_id, known.design_name, known.request_digest, code_version())
+
+
+def uploaded_origin(body: VerificationRequest) -> Origin:
+    """Where a table comes from that a request holds."""
+    canonical = orjson.dumps(body.model_dump(mode="json"), option=orjson.OPT_SORT_KEYS)
+    return Origin(None, None, hashlib.sha256(canonical).hexdigest(), code_version())
+
+
+def summary_of(
+    envelope: DesignedEnvelope, designed: DesignedController, origin: Origin, settings: Settings, at: str
+) -> TableProof:
+    """What a schedule file says of the proof of its table: of the model, at the rates that are proved by default.
+
+    The digest is that of the certificate as it is answered without a query. `at` is the pointer to where it is asked.
+
+    Raises
+    ------
+    LimitExceeded : too many pieces
+    InvalidRequest : the model refuses the numbers
+    """
+    wanted = WantedSummary(rates=True)
+    asked = proof_request(wanted)
+    check_work(envelope.plant.grid.shape, 1, wanted, asked, settings, at)
+    found = verified(envelope.study, envelope.plant, designed, wanted, asked)
+    certified = to_document(found.proof, origin)["sha256"] if found.proof.summary.proved else None
+    return table_proof(found.proof, designed, found.rates, certified)
 
 
 def _or_why(function: Callable[[], Result]) -> Result | str:

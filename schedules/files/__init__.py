@@ -8,13 +8,14 @@ outcomes, and the rule between and outside the grid points.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from schedules.files.c_header import write_c_header
 from schedules.files.c_source import write_c_source
 from schedules.files.checks import require_writable
 from schedules.files.csv_file import read_csv, write_csv
 from schedules.files.dave_ml_file import write_dave_ml
+from schedules.files.hdf5_file import LibraryMissing, read_hdf5, write_hdf5
 from schedules.files.jsbsim_file import write_jsbsim
 from schedules.files.json_file import read_json, write_json
 from schedules.files.matlab_file import write_matlab
@@ -23,16 +24,19 @@ from schedules.files.matlab_script import write_matlab_script
 from schedules.files.npz_file import read_npz, write_npz
 from schedules.files.words import file_name, file_name_parts
 from schedules.fill import FilledSchedule, FillRule, MissingGains, filled
+from schedules.proof.table_proof import without_proof
 from schedules.schedule import GainSchedule
 
 __all__ = [
     "FILE_FORMATS",
     "FileFormat",
     "FillRule",
+    "LibraryMissing",
     "MissingGains",
     "file_name",
     "file_name_parts",
     "read_csv",
+    "read_hdf5",
     "read_json",
     "read_matlab",
     "read_npz",
@@ -67,6 +71,7 @@ FILE_FORMATS: dict[str, FileFormat] = {
         FileFormat("csv", "text/csv; charset=utf-8", write_csv),
         FileFormat("mat", "application/x-matlab-data", write_matlab),
         FileFormat("npz", "application/x-npz", write_npz),
+        FileFormat("h5", "application/x-hdf5", write_hdf5),
         FileFormat("h", "text/x-chdr; charset=utf-8", write_filled=write_c_header),
         FileFormat("c", "text/x-csrc; charset=utf-8", write_filled=write_c_source),
         FileFormat("m", "text/x-matlab; charset=utf-8", write_filled=write_matlab_script),
@@ -87,6 +92,7 @@ def write_schedule(schedule: GainSchedule, suffix: str, fill: FillRule | None = 
 
     Raises
     ------
+    LibraryMissing : HDF5, and h5py is not installed
     MissingGains : a format that needs a number everywhere, points that are not ok, and no rule or none that fits
     ValueError : there is no such format or rule, the format takes no rule or cannot hold this schedule, or the schedule
         breaks one of the promises of `schedules.files.checks.require_writable`
@@ -96,7 +102,8 @@ def write_schedule(schedule: GainSchedule, suffix: str, fill: FillRule | None = 
     require_writable(schedule)
     form = FILE_FORMATS[suffix]
     if form.write_filled is not None:
-        return form.write_filled(filled(schedule, fill))
+        # What is filled is no longer the table that was proved; the designed one, which the file tells of, is.
+        return form.write_filled(replace(filled(without_proof(schedule), fill), designed=schedule))
     if fill is not None:
         raise ValueError(f"a {suffix} file says where there is no gain: it takes no fill rule")
     assert form.write is not None

@@ -25,6 +25,7 @@ from design.outcome import Outcome, Outcomes
 from model.arrays import FloatArray
 from model.flight import GridAxis
 from schedules.files.header import header, object_array, require_format, schedule_from, units
+from schedules.files.proof_words import proof_members
 from schedules.schedule import GainSchedule
 from schedules.wire_names import axis_name, inner_name
 
@@ -65,7 +66,7 @@ def read_csv(content: bytes) -> GainSchedule:
 def _comments(schedule: GainSchedule) -> list[str]:
     failed = (tuple(i) for i in np.argwhere(schedule.outcomes.codes != Outcome.OK).tolist())
     reasons = [(i, schedule.outcomes.reasons[i]) for i in failed]
-    values: dict[str, Any] = {**header(schedule), "units": units(schedule)}
+    values: dict[str, Any] = {**header(schedule), **proof_members(schedule), "units": units(schedule)}
     lines = [f"# {name}: {json.dumps(value)}" for name, value in values.items()]
     lines += [f"# {_REASON}{json.dumps(i)}: {json.dumps(why)}" for i, why in reasons if why is not None]
     # The count includes the line that holds it.

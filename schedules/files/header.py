@@ -16,6 +16,8 @@ from design.outcome import Outcomes
 from model.arrays import ObjectArray
 from model.flight import GridAxis
 from schedules.files.checks import require_writable
+from schedules.files.proof_words import proof_from
+from schedules.proof.table_proof import proved_schedule
 from schedules.rules import INTEGRATOR_PLACEMENTS, INTERPOLATIONS, OUTS_OF_RANGE, ScheduleRules
 from schedules.schedule import SCHEMA_VERSION, SIGN_CONVENTION, GainSchedule, Provenance
 from schedules.wire_names import axis_name
@@ -54,12 +56,13 @@ def units(schedule: GainSchedule) -> dict[str, str]:
 def schedule_from(
     header: Mapping[str, Any], axes: tuple[GridAxis, ...], gains: tuple[Gain, ...], outcomes: Outcomes
 ) -> GainSchedule:
-    """Schedule from the parts of a file that was read.
+    """Schedule from the parts of a file that was read, with the summary of its proof where the file holds one.
 
     Raises
     ------
     ValueError : not a schedule file, another schema version, a word missing or not text, a rule
-        that this product does not have or that the file's version has not, or parts that do not fit together
+        that this product does not have or that the file's version has not, parts that do not fit together, or a proof
+        of another table
     """
     require_format(header)
     schedule = GainSchedule(
@@ -76,7 +79,8 @@ def schedule_from(
         placement = header["integrator_placement"]
         raise ValueError(f"integrator_placement is {placement!r}, which schema_version 1 does not have")
     require_writable(schedule)
-    return schedule
+    proof = proof_from(header.get("proof"))
+    return schedule if proof is None else proved_schedule(schedule, proof)
 
 
 def require_format(header: Mapping[str, Any]) -> None:

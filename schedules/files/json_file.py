@@ -17,6 +17,7 @@ from design.outcome import Outcome, Outcomes
 from model.arrays import FloatArray
 from model.flight import GridAxis
 from schedules.files.header import header, object_array, require_format, schedule_from
+from schedules.files.proof_words import proof_members
 from schedules.schedule import GainSchedule
 from schedules.wire_names import axis_name, inner_name
 
@@ -27,6 +28,7 @@ def write_json(schedule: GainSchedule) -> bytes:
     """The schedule as a JSON document, one member a line, in ASCII."""
     members: dict[str, Any] = {
         **header(schedule),
+        **proof_members(schedule),
         "array_order": ARRAY_ORDER,
         "axes": [{"name": axis_name(a), "unit": a.unit, "values": list(a.values)} for a in schedule.axes],
         "outcomes": np.vectorize(str, otypes=[object])(schedule.outcomes.codes).tolist(),

@@ -9,6 +9,7 @@ dynamic_pressure_pa, K_p, h, q)`` is the multilinear rule once h and q are clipp
 from __future__ import annotations
 
 import io
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from design.gains import Gain
 from model.arrays import FloatArray, ObjectArray
 from model.linear_model import INPUTS
 from schedules.files.header import FORMAT, header, object_array, units
+from schedules.files.proof_words import proof_members
 from schedules.schedule import GainSchedule
 from schedules.wire_names import axis_name
 
@@ -101,7 +103,10 @@ def gain_matrix(schedule: GainSchedule, symbol: str) -> GainMatrix | None:
 
 def _about(schedule: GainSchedule) -> dict[str, Any]:
     words = {name: _char(w) if isinstance(w, str) else float(w) for name, w in header(schedule).items()}
+    proof = proof_members(schedule)
     return words | {
+        "proof": json.dumps(proof["proof"]),
+        "proof_reason": proof["proof_reason"] or "",
         "axes": _cells([axis_name(axis) for axis in schedule.axes]),
         "units": {name: _char(unit) for name, unit in units(schedule).items()},
         "array_order": ARRAY_ORDER,

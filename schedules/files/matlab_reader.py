@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ def read_matlab(content: bytes) -> GainSchedule:
         raise ValueError("not a schedule file: it has no struct gainfield")
     words = {name: _word(value) for name, value in about.items()}
     require_format(words)
+    words["proof"] = _proof(words.get("proof"))
     units = about.get("units")
     if not isinstance(units, dict):
         raise ValueError("units must be a struct")
@@ -57,6 +59,14 @@ def _word(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.size == 0:
         return ""
     return value
+
+
+def _proof(word: Any) -> Any:
+    """The summary of a proof, which stands in the struct as a text of JSON; files of before there was one have none."""
+    try:
+        return None if word is None else json.loads(str(word))
+    except RecursionError:
+        raise ValueError("proof is nested too deeply") from None
 
 
 def _axis(variables: dict[str, Any], name: str, unit: str) -> GridAxis:

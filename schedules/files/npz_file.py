@@ -19,6 +19,7 @@ from design.outcome import Outcome, Outcomes
 from model.arrays import FloatArray
 from model.flight import GridAxis
 from schedules.files.header import header, object_array, require_format, schedule_from, units
+from schedules.files.proof_words import proof_members
 from schedules.schedule import GainSchedule
 from schedules.wire_names import axis_name, inner_name
 
@@ -85,6 +86,7 @@ def read_npz(content: bytes) -> GainSchedule:
 def _about(schedule: GainSchedule) -> str:
     words: dict[str, Any] = {
         **header(schedule),
+        **proof_members(schedule),
         "array_order": ARRAY_ORDER,
         "axes": [axis_name(axis) for axis in schedule.axes],
         "gains": [gain.name for gain in schedule.gains],

@@ -10,7 +10,9 @@ import numpy as np
 
 from schedules.files.csv_file import write_csv
 from schedules.files.header import header, units
+from schedules.files.proof_words import proof_in_words
 from schedules.fill import FILL_RULES, FilledSchedule
+from schedules.proof.table_proof import without_proof
 from schedules.rules import INTERPOLATIONS, OUTS_OF_RANGE
 from schedules.schedule import GainSchedule
 from schedules.wire_names import axis_name
@@ -26,6 +28,7 @@ def words(schedule: FilledSchedule, array_order: str) -> Iterator[tuple[str, str
     yield "array_order", array_order
     yield "outcomes", outcomes_in_words(schedule)
     yield "fill", fill_in_words(schedule)
+    yield "proof", proof_in_words(designed)
     for point in np.argwhere(schedule.filled).tolist():
         yield f"filled_point {point}", _origin(schedule, tuple(point))
 
@@ -98,8 +101,8 @@ def identifier(text: str) -> str:
 
 
 def fingerprint(schedule: FilledSchedule) -> str:
-    """Sixteen hexadecimal digits that two different tables do not share, however they are named."""
-    content = write_csv(schedule.designed) + str(schedule.rule).encode()
+    """Sixteen hexadecimal digits that two different tables do not share, however they are named, proved or not."""
+    content = write_csv(without_proof(schedule.designed)) + str(schedule.rule).encode()
     return hashlib.sha256(content).hexdigest()[:16]
 
 

@@ -1,17 +1,19 @@
 """The portable certificate of a proof: all that `schedules.verify` needs to check it, as JSON.
 
-=============== =========================================================================================
-member          holds
-=============== =========================================================================================
-``axes``        altitude and speed with their breakpoints, names and units
-``gains``       the tables that were proved, by name, ``values[i][j]``; null where a point has no gain
-``terms``       name and power of the speed coordinate of each of the plant's terms
-``monomials``   indices of the gain, or of the two gains, that multiply each of the ``injections``
-``plants``      ``[variant][term]`` n by n matrices; ``variants`` names what is off in each
-``injections``  ``[variant][monomial]`` n by n matrices
-``cells``       proved ones: index of the lower corner, alpha, pieces with box, factors, alpha and P
-``sha256``      digest of the other members, as `digest` makes it
-=============== =========================================================================================
+================  =======================================================================================
+member            holds
+================  =======================================================================================
+``provenance``    ``design_id``, ``design_name``, ``request_digest`` and ``version`` of the code; null where not known
+``axes``          altitude and speed with their breakpoints, names and units
+``gains``         the tables that were proved, by name, ``values[i][j]``; null where a point has no gain
+``terms``         name and power of the speed coordinate of each of the plant's terms
+``monomials``     indices of the gain, or of the two gains, that multiply each of the ``injections``
+``plants``        ``[variant][term]`` n by n matrices; ``variants`` names what is off in each
+``injections``    ``[variant][monomial]`` n by n matrices
+``cells``         proved ones: index of the lower corner, alpha, pieces with box, factors, alpha and P
+``table_sha256``  digest of axes and gains, by `schedules.proof.table_proof.table_digest`: which table was proved
+``sha256``        digest of the other members, as `document_digest` makes it
+================  =======================================================================================
 
 ``Acl = sum of terms times plants + sum of monomials times injections``. A term is the power of the speed coordinate
 times those ``factors`` of the piece that name it, each anywhere between its two ``ends``.
@@ -19,9 +21,7 @@ times those ``factors`` of the piece that name it, each anywhere between its two
 
 from __future__ import annotations
 
-import hashlib
-import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -30,15 +30,37 @@ from model.arrays import FloatArray
 from model.flight import GridAxis
 from schedules.proof.flight_box import EXPONENTS, Box
 from schedules.proof.result import CellStatus, Piece, ScheduleProof
+from schedules.proof.table_proof import digest, table_digest, table_members
 from schedules.schedule import GainSchedule
 
 FORMAT = "gainfield-proof"
 #: Version of the layout; raised when a reader of the old one would misread the new.
-CERTIFICATE_VERSION = 1
+CERTIFICATE_VERSION = 2
 _STATEMENT = (
     "for every course of altitude and speed inside a piece, however fast, x' P x of the closed loop x' = Acl x decays "
     "at least like exp(-2 alpha t), with gains multilinear between the grid points"
 )
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the table of a certificate comes from, as far as it is known.
+
+    Attributes
+    ----------
+    design_id, design_name : of the design; None where it is of no stored one
+    request_digest : SHA-256 of the request: for the design, or for the proof of a table that was sent; None of neither
+    version : of the code that proved; None where nobody said
+    """
+
+    design_id: str | None = None
+    design_name: str | None = None
+    request_digest: str | None = None
+    version: str | None = None
+
+
+#: Of a table that was made and proved without a service.
+UNKNOWN = Origin()
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +79,8 @@ class Certificate:
     Attributes
     ----------
     controller : name
+    origin : the design it is of, and the code
+    table_digest : of the axes and the gains
     axes : of the grid
     gains : (nh, ns) tables by name, nan where a point has no gain
     covers : which plants, in words
@@ -66,6 +90,8 @@ class Certificate:
     """
 
     controller: str
+    origin: Origin
+    table_digest: str
     axes: tuple[GridAxis, GridAxis]
     gains: dict[str, FloatArray]
     covers: str
@@ -89,8 +115,12 @@ class Certificate:
         return None
 
 
-def to_document(proof: ScheduleProof) -> dict[str, Any]:
+def to_document(proof: ScheduleProof, origin: Origin = UNKNOWN) -> dict[str, Any]:
     """The certificate of a proof, ready for `json.dumps`.
+
+    Parameters
+    ----------
+    origin : where the table comes from
 
     Raises
     ------
@@ -99,15 +129,18 @@ def to_document(proof: ScheduleProof) -> dict[str, Any]:
     made, proved = proof.family, [cell for cell in proof.cells if cell.status is CellStatus.PROVED]
     if made is None or not proved:
         raise ValueError(f"controller {proof.controller}: no cell is proved, there is nothing to certify")
+    axes, gains = table_members(proof.axes, {name: made.tables[..., k] for k, name in enumerate(made.gains)})
     exponents, corners = EXPONENTS[proof.flight.speed_axis], made.variants.corners
     document: dict[str, Any] = {
         "format": FORMAT,
         "certificate_version": CERTIFICATE_VERSION,
         "statement": _STATEMENT,
         "controller": proof.controller,
+        "provenance": asdict(origin),
         "covers": proof.covers,
-        "axes": [{"name": axis.name, "unit": axis.unit, "values": list(axis.values)} for axis in proof.axes],
-        "gains": [{"name": name, "values": _nullable(made.tables[..., k])} for k, name in enumerate(made.gains)],
+        "axes": axes,
+        "gains": gains,
+        "table_sha256": digest([axes, gains]),
         "terms": [[name, exponents[name]] for name in made.terms],
         "monomials": [list(monomial) for monomial in made.monomials],
         "variants": {
@@ -128,13 +161,12 @@ def to_document(proof: ScheduleProof) -> dict[str, Any]:
         "of": len(proof.cells),
         "alpha": min(cell.alpha for cell in proved),
     }
-    return {**document, "sha256": digest(document)}
+    return {**document, "sha256": document_digest(document)}
 
 
-def digest(document: dict[str, Any]) -> str:
-    """SHA-256 of all members but ``sha256``: of their JSON with sorted names, as Python's `json` writes it."""
-    rest = {name: value for name, value in document.items() if name != "sha256"}
-    return hashlib.sha256(json.dumps(rest, sort_keys=True, allow_nan=False).encode()).hexdigest()
+def document_digest(document: dict[str, Any]) -> str:
+    """Digest of all members but ``sha256``."""
+    return digest({name: value for name, value in document.items() if name != "sha256"})
 
 
 def from_document(document: dict[str, Any]) -> Certificate:
@@ -146,7 +178,7 @@ def from_document(document: dict[str, Any]) -> Certificate:
     """
     if document.get("format") != FORMAT or document.get("certificate_version") != CERTIFICATE_VERSION:
         raise ValueError(f"not a {FORMAT} of version {CERTIFICATE_VERSION}")
-    if document.get("sha256") != digest(document):
+    if document.get("sha256") != document_digest(document):
         raise ValueError("the certificate was changed: its digest is another")
     try:
         axes = tuple(GridAxis(item["name"], item["unit"], tuple(item["values"])) for item in document["axes"])
@@ -155,8 +187,12 @@ def from_document(document: dict[str, Any]) -> Certificate:
         altitude, speed = axes
         if any(values.shape != (len(altitude.values), len(speed.values)) for values in gains.values()):
             raise ValueError("the gains are not of the grid's shape")
+        if table_digest(axes, gains) != document["table_sha256"]:
+            raise ValueError("the certificate is of another table: its table_sha256 is not that of its axes and gains")
         return Certificate(
             document["controller"],
+            Origin(**document["provenance"]),
+            document["table_sha256"],
             (altitude, speed),
             gains,
             document["covers"],
@@ -188,7 +224,3 @@ def _cell(item: dict[str, Any]) -> ProvedCell:
 def _read_piece(item: dict[str, Any]) -> Piece:
     (low, high), (slow, fast) = item["box"]
     return Piece(Box((low, high), (slow, fast)), item["alpha"], np.array(item["P"], dtype=float), item["margin"])
-
-
-def _nullable(values: FloatArray) -> list[list[float | None]]:
-    return [[None if np.isnan(value) else float(value) for value in row] for row in values]

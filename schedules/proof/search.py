@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import FloatArray
+from schedules.proof.barrier import Answer, central
 from schedules.proof.decay import decay_rates, slowest
 from schedules.proof.semidefinite import best_lyapunov
 
@@ -19,6 +20,8 @@ MOST_ROUNDS = 8
 WORTHWHILE = 0.02
 #: Rounds as good as the last that a proof must not be farther away than.
 HOPE = 4.0
+#: Loops of which `central` is asked first.
+FEW_LOOPS = 48
 #: Loops of the first programme, and those that join it at a time.
 FIRST_LOOPS, MORE_LOOPS = 40, 16
 
@@ -42,6 +45,14 @@ def lyapunov(A: FloatArray, largest: bool = False, start: FloatArray | None = No
         return None
     if rate > 0.0 and not largest:
         return best
+    if not largest and len(A) <= FEW_LOOPS:
+        L = np.asarray(np.linalg.cholesky(P))
+        path = central(L.T @ A @ np.linalg.inv(L).T)
+        if path.answer is Answer.NONE:
+            return None
+        candidate = _back(path.X, L)
+        if _least_rate(A, candidate) > 0.0:
+            return candidate
     aim = 0.0
     for _ in range(MOST_ROUNDS):
         found = _solved(A, best, aim)
@@ -70,7 +81,7 @@ def _least_rate(A: FloatArray, P: FloatArray) -> float:
 
 def _solved(A: FloatArray, P: FloatArray, rate: float) -> FloatArray | None:
     """The programme's answer for all loops, in the coordinates they came in; None where it is not positive."""
-    L = np.linalg.cholesky(P)
+    L = np.asarray(np.linalg.cholesky(P))
     turned = L.T @ A @ np.linalg.inv(L).T
     used = np.argsort(decay_rates(A, P))[:FIRST_LOOPS]
     while True:
@@ -90,6 +101,11 @@ def _solved(A: FloatArray, P: FloatArray, rate: float) -> FloatArray | None:
             break
         worst[~broken] = -np.inf
         used = np.concatenate([used, np.argsort(-worst)[: min(MORE_LOOPS, int(np.sum(broken)))]])
+    return _back(X, L)
+
+
+def _back(X: FloatArray, L: FloatArray) -> FloatArray:
+    """A matrix in the coordinates that the loops came in, its largest entry 1."""
     found = L @ X @ L.T
     return np.asarray(found + found.T) / (2.0 * float(np.max(np.abs(found))))
 

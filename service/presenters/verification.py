@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
-
-import numpy as np
 
 from model.flight import FlightGrid
 from schedules.proof.frozen import SlowestPoint
 from schedules.proof.reading_error import LARGEST_ERROR, ReadingMargin, ReadingMargins
 from schedules.proof.result import CellProof, CellStatus, ScheduleProof
 from schedules.proof.scheduling_rates import SchedulingRates
+from schedules.proof.table_proof import rate_bound
 from schedules.rules import INTERPOLATIONS, OUTS_OF_RANGE
-from schedules.wire_names import axis_name
 from service.presenters.grid import grid_document
 
 NOT_ASKED = "not asked for"
@@ -92,22 +90,10 @@ def _summary(found: Verified) -> dict[str, Any]:
         "pieces": said.pieces,
         "common": said.common,
         "words": said.words,
-        "rate_bound": None if isinstance(rates, str) else _rate_bound(found.proof, rates),
+        "rate_bound": None if isinstance(rates, str) else asdict(rate_bound(found.proof, rates)),
         "rate_bound_reason": rates if isinstance(rates, str) else None,
         "signal_error": None if isinstance(margins, str) else _signal_error(margins),
         "signal_error_reason": margins if isinstance(margins, str) else None,
-    }
-
-
-def _rate_bound(proof: ScheduleProof, rates: SchedulingRates) -> dict[str, Any]:
-    axis, unlimited = proof.axes[1], bool(np.isinf(rates.speed_rate))
-    return {
-        "altitude_rate_m_s": rates.altitude_rate,
-        "axis": axis_name(axis),
-        "speed_rate": None if unlimited else rates.speed_rate,
-        "unit": "1/s" if axis.unit == "1" else f"{axis.unit}/s",
-        "unlimited": unlimited,
-        "decay_rate_1_s": rates.alpha,
     }
 
 

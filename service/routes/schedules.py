@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, get_args
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Annotated, Any, Literal, get_args
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from schedules.files import FILE_FORMATS, FileFormat, FillRule, MissingGains, file_name_parts, write_schedule
+from schedules.files import (
+    FILE_FORMATS,
+    FileFormat,
+    FillRule,
+    LibraryMissing,
+    MissingGains,
+    file_name_parts,
+    write_schedule,
+)
+from schedules.proof.table_proof import proved_schedule
 from schedules.rules import IntegratorPlacement, Interpolation, OutOfRange, ScheduleRules
 from schedules.schedule_of import schedule_of
 from service.answering import answer, download_headers
@@ -16,7 +27,8 @@ from service.openapi import problems
 from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound
 from service.routes.designs import DesignId
 from service.schemas.wire import PARAMETERS
-from service.state import HEAVY, DesignsHere
+from service.state import DesignsHere, SettingsHere, own_slot, slot
+from service.verification_of import origin_of, summary_of
 
 router = APIRouter(prefix="/v1/designs/{id}/schedules", tags=["schedules"])
 
@@ -47,13 +59,26 @@ class Options(BaseModel):
     integrator_placement: IntegratorPlacement = Field(
         default="before_gain", description="Where the integrators stand; both are one law while the gains stay"
     )
+    certificate: Literal["summary"] | None = Field(
+        default=None,
+        description="`summary`: the file says what is proved between its points: cells, decay rate, rates of flight, "
+        "with the digests of the table and of its certificate. That takes seconds; without it `proof` is null. Only of "
+        "multilinear tables with integrators before their gains",
+    )
+
+
+async def _slot(request: Request) -> AsyncIterator[None]:
+    """A place among the computations, be the design ready or not, where a proof is asked for."""
+    place = own_slot if "certificate" in request.query_params else slot
+    async with asynccontextmanager(place)(request):
+        yield
 
 
 @router.get(
     "/{controller}.{suffix}",
     response_class=Response,
     responses=_FILE | problems(404, 409, 422, 503),
-    dependencies=[HEAVY],
+    dependencies=[Depends(_slot, scope="function")],
 )
 def download_schedule(
     request: Request,
@@ -62,11 +87,12 @@ def download_schedule(
     suffix: Annotated[str, Path(description=f"Format: {', '.join(FILE_FORMATS)}", examples=["csv"])],
     options: Annotated[Options, Query()],
     designs: DesignsHere,
+    settings: SettingsHere,
 ) -> Response:
     """The gain schedule of one controller, with its outcomes, units, law and rule between the points.
 
     A table that needs a number everywhere is refused (409) when a point has no gains, unless `fill` says where they
-    come from.
+    come from. HDF5 is there (404 if not) where the server is installed with the extra `hdf5`.
     """
     if suffix not in FILE_FORMATS:
         raise NotFound(f"there is no schedule file {suffix[:80]!a}; there are {', '.join(FILE_FORMATS)}")
@@ -74,9 +100,16 @@ def download_schedule(
     _check_fill(form, options.fill)
     envelope = designs.envelope(ident)
     rules = ScheduleRules(options.rule, options.out_of_range, options.integrator_placement)
-    schedule = schedule_of(envelope, controller_of(envelope, controller), designs.provenance(ident), rules)
+    designed = controller_of(envelope, controller)
+    schedule = schedule_of(envelope, designed, designs.provenance(ident), rules)
+    if options.certificate is not None:
+        _check_provable(rules)
+        proof = summary_of(envelope, designed, origin_of(designs, ident), settings, "/certificate")
+        schedule = proved_schedule(schedule, proof)
     try:
         content = write_schedule(schedule, suffix, options.fill)
+    except LibraryMissing as missing:
+        raise NotFound(f"this server writes no schedule file {suffix}: {missing}") from missing
     except MissingGains as missing:
         detail = f"{missing}; {_WITH_MISSING} files say where there is no gain"
         raise NoDesignAtPoint(detail) from missing
@@ -86,6 +119,13 @@ def download_schedule(
         ) from refused
     headers = download_headers(*file_name_parts(schedule, suffix), suffix=suffix)
     return answer(request, content, media_type=form.media_type, headers=headers)
+
+
+def _check_provable(rules: ScheduleRules) -> None:
+    if rules.interpolation != "multilinear" or rules.integrator_placement != "before_gain":
+        detail = "only a multilinear table with integrators before their gains is proved between its points"
+        allowed = "nothing, or summary with the rule multilinear and the integrator_placement before_gain"
+        raise InvalidRequest(f"/certificate: {detail}", FieldRefusal("/certificate", detail, None, allowed))
 
 
 def _check_fill(form: FileFormat, fill: FillRule | None) -> None:

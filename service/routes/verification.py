@@ -19,7 +19,15 @@ from service.routes.designs import DesignId
 from service.schemas.verification_answers import UploadedVerification, Verification
 from service.schemas.verification_requests import CertificateQuery, VerificationQuery, VerificationRequest
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
-from service.verification_of import answerable, check_work, proof_request, uploaded_of, verified
+from service.verification_of import (
+    answerable,
+    check_work,
+    origin_of,
+    proof_request,
+    uploaded_of,
+    uploaded_origin,
+    verified,
+)
 
 router = APIRouter(prefix="/v1", tags=["verification"], route_class=JsonRoute)
 
@@ -51,7 +59,7 @@ def verification(
         controllers = list(envelope.controllers)
     else:
         controllers = [controller_of(envelope, name) for name in dict.fromkeys(wanted.controller)]
-    check_work(envelope.plant.grid.shape, len(controllers), wanted, asked, settings, "")
+    check_work(envelope.plant.grid.shape, len(controllers), wanted, asked, settings, "/pieces")
     found = {
         one.request.name: verified(envelope.study, envelope.plant, one, wanted, asked) for one in controllers
     }  # fmt: skip
@@ -74,16 +82,17 @@ def certificate(
 ) -> Response:
     """The proof itself: gains, plant matrices, and each piece's box, rate and Lyapunov matrix.
 
-    `python -m schedules.verify FILE` checks it with numpy alone. Refused (409) where no cell is proved.
+    `python -m schedules.verify FILE` checks it with numpy alone, and with the `table_sha256` of a schedule file's
+    summary that it is of that table. Refused (409) where no cell is proved.
     """
     envelope, asked = designs.envelope(ident), proof_request(wanted)
     controller = controller_of(envelope, name)
-    check_work(envelope.plant.grid.shape, 1, wanted, asked, settings, "")
+    check_work(envelope.plant.grid.shape, 1, wanted, asked, settings, "/pieces")
     proof = answerable(lambda: prove(envelope.study, envelope.plant, controller, asked))
     if proof.summary.proved == 0:
         raise StudyNotPossible(f"controller {name}: nothing to certify, {proof.summary.words}")
     headers = download_headers(envelope.study.name, name, "certificate", suffix="json")
-    return answer(request, encode(to_document(proof)), headers=headers)
+    return answer(request, encode(to_document(proof, origin_of(designs, ident))), headers=headers)
 
 
 @router.post(
@@ -97,14 +106,16 @@ def verify_schedule(
 ) -> Response:
     """Any table of gains against a plant: proved or refuted cell by cell, on the table's own axes.
 
-    The table is a list of axes and gains, or a schedule file of this product as it is. Its gains are taken as they are:
+    The table is a list of axes and gains, or a schedule file of this product as it is; what a file says of a proof has
+    no part. Its gains are taken as they are:
     a table that does not hold is refuted, at a point that is named.
     """
     asked = proof_request(body.proof, "/proof")
-    check_work(body.schedule.shape, 1, body.proof, asked, settings, "/proof")
+    check_work(body.schedule.shape, 1, body.proof, asked, settings, "/proof/pieces")
     uploaded = uploaded_of(body, designs, settings)
     designed = uploaded.designed
     found = verified(uploaded.study, uploaded.plant, designed, body.proof, asked)
     document = verification_document(uploaded.plant.grid, {designed.request.name: found})
     certified = body.certificate and found.proof.summary.proved > 0
-    return answer(request, encode(document | {"certificate": to_document(found.proof) if certified else None}))
+    made = to_document(found.proof, uploaded_origin(body)) if certified else None
+    return answer(request, encode(document | {"certificate": made}))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, Field, Tag, model_validator
 
@@ -203,6 +203,10 @@ class GainTable(Request):
     out_of_range: Text | None = None
     integrator_placement: Text | None = None
     array_order: Text | None = None
+    proof: dict[str, Any] | None = Field(
+        default=None, description="What a file says of the proof of its table; it has no part: the table is proved anew"
+    )
+    proof_reason: Text | None = None
 
     @property
     def shape(self) -> tuple[int, int]:

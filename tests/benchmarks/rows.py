@@ -31,7 +31,7 @@ from tests.benchmarks import peers
 from tests.benchmarks.cases import DURATION, GAINS, SAMPLES, STEP, TAB_ACTUATOR, Case, case, tab_only
 from tests.benchmarks.manoeuvre_rows import manoeuvre_rows
 from tests.benchmarks.measure import Row
-from tests.benchmarks.proof_rows import proof_row
+from tests.benchmarks.proof_rows import proof_row, search_row
 from tests.benchmarks.simulation_rows import simulation_rows
 
 
@@ -54,6 +54,7 @@ def rows() -> list[Row]:
         _refined_steps(c),
         *manoeuvre_rows(c),
         *simulation_rows(c),
+        search_row(c),
         proof_row(c),
         _whole(c),
     ]

@@ -57,7 +57,7 @@ def test_missing_gains_are_filled_by_a_named_rule_only(
     assert "lqr has no gains at 1 of 2 points" in problem["detail"]
     assert "Mach" in problem["detail"]
     assert "nearest_ok, hold_neighbour" in problem["detail"]
-    assert "json, csv, mat, npz files say where there is no gain" in problem["detail"]
+    assert "json, csv, mat, npz, h5 files say where there is no gain" in problem["detail"]
     schedule = read_npz(client.get(f"{holed}.npz").content)
     tags = set()
     for rule in ("nearest_ok", "hold_neighbour"):
@@ -74,7 +74,7 @@ def test_formats_that_say_missing_take_no_rule(client: TestClient, holed: str, r
     problem = refused(client.get(f"{holed}.{suffix}?fill=nearest_ok"), 422)
     (error,) = problem["errors"]
     assert error["pointer"] == "/fill"
-    assert "nothing with json, csv, mat, npz" in error["allowed"]
+    assert "nothing with json, csv, mat, npz, h5" in error["allowed"]
 
 
 @pytest.mark.parametrize("query", ["fill=zero", "fill=", "fill=nearest_ok&fill=", "rule=nearest_ok"])

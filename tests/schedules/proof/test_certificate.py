@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 
 from schedules.perturbations import Uncertainty
-from schedules.proof.certificate import digest, from_document, to_document
+from schedules.proof.certificate import Origin, document_digest, from_document, to_document
 from schedules.proof.prove import ProofRequest, prove
+from schedules.proof.table_proof import digest
 from schedules.schedule import GainSchedule, Provenance
 from schedules.study import GridRequest
 from schedules.verify import verify
 
 ROOT = Path(__file__).parents[3]
+ORIGIN = Origin(design_id="d-1", design_name="tunnel", request_digest="0f" * 32, version="0.1.0")
 
 
 @pytest.fixture(scope="session")
@@ -29,12 +31,13 @@ def proofs(example_a):
 @pytest.fixture
 def documents(proofs):
     """Fresh copies, as they come out of a file."""
-    return {name: json.loads(json.dumps(to_document(proof), allow_nan=False)) for name, proof in proofs.items()}
+    return {name: json.loads(json.dumps(to_document(proof, ORIGIN), allow_nan=False)) for name, proof in proofs.items()}
 
 
 def resealed(document):
-    """With the digest that the changed document should have: what someone who means it would do."""
-    return {**document, "sha256": digest(document)}
+    """With the digests that the changed document should have: what someone who means it would do."""
+    changed = {**document, "table_sha256": digest([document["axes"], document["gains"]])}
+    return {**changed, "sha256": document_digest(changed)}
 
 
 @pytest.mark.parametrize("name", ["nf", "pf", "lqr"])
@@ -45,19 +48,25 @@ def test_a_certificate_holds(documents, name):
 def test_certificates_of_other_grids_and_plants_hold(envelope_of, only_lqr, airliner, example_a):
     for speed in (("airspeed", (20.0, 45.0)), ("mach", (0.06, 0.14))):
         study, envelope = envelope_of(grid=GridRequest((0.0, 3000.0), *speed), controllers=only_lqr)
-        assert verify(to_document(prove(study, envelope.plant, envelope.controllers[0]))).startswith("proved: 1 of 1")
+        assert verify(to_document(prove(study, envelope.plant, envelope.controllers[0]), ORIGIN)).startswith(
+            "proved: 1 of 1"
+        )
     study, envelope = airliner
-    assert verify(to_document(prove(study, envelope.plant, envelope.controllers[0]))).startswith("proved: 4 of 4")
+    assert verify(to_document(prove(study, envelope.plant, envelope.controllers[0]), ORIGIN)).startswith(
+        "proved: 4 of 4"
+    )
     study, envelope = example_a
     request = ProofRequest(changes=(Uncertainty("C_Ha_da", 0.2), Uncertainty("aileron_inertia", 0.2)), together=True)
-    document = to_document(prove(study, envelope.plant, envelope.controller("lqr"), request))
+    document = to_document(prove(study, envelope.plant, envelope.controller("lqr"), request), ORIGIN)
     assert len(document["plants"]) == 4
     assert verify(document).startswith("proved: 3 of 3")
 
 
 def test_one_breakpoint_an_axis_can_be_certified(envelope_of, only_lqr):
     study, envelope = envelope_of(grid=GridRequest((100.0,), "dynamic_pressure", (600.0,)), controllers=only_lqr)
-    assert verify(to_document(prove(study, envelope.plant, envelope.controllers[0]))).startswith("proved: 1 of 1")
+    assert verify(to_document(prove(study, envelope.plant, envelope.controllers[0]), ORIGIN)).startswith(
+        "proved: 1 of 1"
+    )
 
 
 def test_products_of_gains_can_be_certified(wind_tunnel_study, wind_tunnel_envelope, with_gains, envelope_of):
@@ -71,11 +80,18 @@ def test_products_of_gains_can_be_certified(wind_tunnel_study, wind_tunnel_envel
     proof = prove(study, envelope.plant, designed, ProofRequest(fraction=0.3))
     assert proof.proved, proof.summary.words
     assert proof.family.gain_degree == 2
-    document = to_document(proof)
+    document = to_document(proof, ORIGIN)
     assert verify(document).startswith("proved: 3 of 3")
     document["gains"][0]["values"][0][0] *= 2.0
     with pytest.raises(ValueError, match="what its matrix proves"):
         verify(resealed(document))
+
+
+def beyond_the_grid(document):
+    """A cell is replaced by one of no width, at the last breakpoint, which hardly says anything."""
+    axis, (whole, *_) = document["axes"][1]["values"], document["cells"][-1]["pieces"]
+    box = [whole["box"][0], [axis[-1], axis[-1]]]
+    document["cells"][1] = {**document["cells"][-1], "index": [0, len(axis) - 1], "pieces": [{**whole, "box": box}]}
 
 
 MUTATIONS = {
@@ -98,6 +114,8 @@ MUTATIONS = {
     "a box made lower": lambda d: d["cells"][0]["pieces"][0]["box"][0].__setitem__(1, 2999.0),
     "a cell left out": lambda d: d["cells"].pop(),
     "a cell twice, another left out": lambda d: d["cells"].__setitem__(1, d["cells"][0]),
+    "a cell beyond the grid": lambda d: beyond_the_grid(d),
+    "number of cells": lambda d: d.__setitem__("of", 2),
     "a breakpoint": lambda d: d["axes"][1]["values"].__setitem__(0, 200.0),
     "a plant": lambda d: d["plants"][0][1][3].__setitem__(2, -d["plants"][0][1][3][2]),
     "an injection": lambda d: d["injections"][0][0].__setitem__(0, [3e4] * len(d["injections"][0][0])),
@@ -125,6 +143,23 @@ def test_a_changed_certificate_is_refused_with_a_digest_of_its_own(documents, ki
     MUTATIONS[kind](document)
     with pytest.raises((ValueError, IndexError, np.linalg.LinAlgError)):
         verify(resealed(document))
+
+
+@pytest.mark.parametrize("name", ["nf", "pf", "lqr"])
+def test_it_is_of_one_table_only(documents, name):
+    """Asked about another table, verifier and reader refuse it; a digest that is not the table's own is refused too."""
+    document, others = documents[name], [d for other, d in documents.items() if other != name]
+    assert verify(document, document["table_sha256"]).startswith("proved: 3 of 3")
+    for other in others:
+        with pytest.raises(ValueError, match="of another table"):
+            verify(document, other["table_sha256"])
+    claimed = {**document, "table_sha256": others[0]["table_sha256"]}
+    claimed["sha256"] = document_digest(claimed)
+    with pytest.raises(ValueError, match="of another table"):
+        verify(claimed)
+    with pytest.raises(ValueError, match="of another table"):
+        from_document(claimed)
+    assert from_document(document).origin == ORIGIN
 
 
 @pytest.mark.parametrize("name", ["nf", "pf", "lqr"])
@@ -189,7 +224,7 @@ def test_nothing_proved_is_nothing_to_certify(example_a):
     study, envelope = example_a
     proof = prove(study, envelope.plant, envelope.controller("lqr"), ProofRequest(decay=50.0))
     with pytest.raises(ValueError, match="nothing to certify"):
-        to_document(proof)
+        to_document(proof, ORIGIN)
 
 
 def test_what_is_not_a_certificate_is_refused(documents):
@@ -201,18 +236,29 @@ def test_what_is_not_a_certificate_is_refused(documents):
         from_document(resealed(document))
 
 
-@pytest.mark.parametrize("good", [True, False])
-def test_the_command(documents, tmp_path, good):
-    document = documents["lqr"]
-    if not good:
+@pytest.mark.parametrize("case", ["good", "good and asked", "changed", "another table", "not one", "no file"])
+def test_the_command(documents, tmp_path, case):
+    document, good = documents["lqr"], case.startswith("good")
+    if case == "changed":
         document["alpha"] = 100.0
+    asked = {"good and asked": [document["table_sha256"]], "another table": [documents["nf"]["table_sha256"]]}
     path = tmp_path / "proof.json"
-    path.write_text(json.dumps(document))
-    command = [sys.executable, "-m", "schedules.verify", str(path)]
+    if case != "no file":
+        path.write_text(json.dumps({} if case == "not one" else document))
+    command = [sys.executable, "-m", "schedules.verify", str(path), *asked.get(case, [])]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode == 0) == good
     assert ("proved: 3 of 3" in done.stdout) == good
     assert ("refused" in done.stderr) == (not good)
+
+
+def test_the_verifier_is_small():
+    """Small enough to be read by whoever is to trust it."""
+    source = (ROOT / "schedules" / "verify.py").read_text()
+    assert len(source.splitlines()) < 60
+    assert {line for line in source.splitlines() if line.startswith(("import", "from"))} == {
+        "import hashlib", "import json", "import sys", "from typing import Any", "import numpy as np",
+    }  # fmt: skip
 
 
 def test_the_verifier_imports_nothing_of_the_product():
