@@ -10,6 +10,9 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+#: How long open answers, streams of events among them, may go on when the server is told to stop [s].
+GRACE = 3
+
 
 def arguments() -> dict[str, object]:
     """The options that were given, by the name of their setting."""
@@ -36,7 +39,13 @@ def main() -> None:
         wrong = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
         raise SystemExit(f"settings: {wrong}") from None
     keep_freed_memory()
-    uvicorn.run(create_app(settings), host=settings.host, port=settings.port, server_header=False)
+    uvicorn.run(
+        create_app(settings),
+        host=settings.host,
+        port=settings.port,
+        server_header=False,
+        timeout_graceful_shutdown=GRACE,
+    )
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import cache
 
-from anyio import Semaphore
+from anyio import Semaphore, to_thread
 from fastapi import FastAPI
 
 from service import errors, openapi, pages
@@ -15,6 +15,9 @@ from service.design_examples import design_requests
 from service.designs import Designs, design_id
 from service.examples import NAMES
 from service.head_requests import HeadRequests
+from service.jobs import refusals as job_refusals
+from service.jobs.example import example_job
+from service.jobs.jobs import Jobs
 from service.routes import ROUTERS
 from service.schemas.requests import DesignRequest
 from service.settings import Settings
@@ -35,9 +38,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         url = chosen.database_url
         store = Store(chosen.data_dir, None if url is None else url.get_secret_value())
         designs = Designs(store.designs, chosen.kept_envelopes)
-        app.state.shared = State(chosen, store, designs, Semaphore(chosen.max_concurrent_designs))
         try:
-            yield
+            jobs = Jobs(store, chosen)
+            app.state.shared = State(chosen, store, designs, Semaphore(chosen.max_concurrent_designs), jobs)
+            try:
+                yield
+            finally:
+                await to_thread.run_sync(jobs.close)
         finally:
             store.close()
 
@@ -54,7 +61,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.include_router(router)
     pages.install(app)
     errors.install(app)
-    openapi.install(app, NAMES[0], example_id)
+    job_refusals.install(app)
+    openapi.install(app, NAMES[0], example_id, example_job)
     app.add_middleware(BodyLimit, limit=chosen.max_body_bytes)
     app.add_middleware(HeadRequests)
     return app

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -20,12 +22,14 @@ from design.lqr.weights import ExplicitWeights, WeightName
 from model.arrays import FloatArray
 from schedules.analysis import PlantEnvelope, analyse
 from schedules.designed import ControllerRefused, DesignedController, DesignedEnvelope
+from schedules.parts import Part, Synthesised, parts, synthesise
 from schedules.run import run
 from schedules.schedule import Provenance
 from schedules.study import PlantStudy, Study
 from service import study_of
 from service.answering import encode
 from service.envelopes import Envelopes
+from service.jobs.frames import cut, joined
 from service.limits import check_envelope
 from service.presenters.design import design_document
 from service.presenters.grid import grid_index
@@ -86,10 +90,25 @@ class Designs:
         found = self._store.get(ident)
         if found is not None:
             return found, False
-        envelope = self._envelopes.get(ident, lambda: designed(request))
-        made = _stored(ident, request, envelope)
-        kept = self._store.add(made)
-        return kept, kept is made
+        made: list[tuple[StoredDesign, bool]] = []
+
+        def make() -> DesignedEnvelope:
+            done = [synthesised(request, part) for part in parts_of(request)]
+            new, envelope = stored_design(ident, request, done, time.time())
+            kept = self._store.add(new)
+            made.append((kept, kept is new))
+            return envelope
+
+        self._envelopes.get(ident, make)
+        if not made and (found := self._store.get(ident)) is not None:
+            return found, False
+        if not made:  # the envelope outlived its design
+            make()
+        return made[0]
+
+    def known(self, ident: str) -> StoredDesign | None:
+        """The stored design, None when there is none."""
+        return self._store.get(ident)
 
     def find(self, ident: str) -> StoredDesign:
         """The stored design.
@@ -175,14 +194,46 @@ def _at_fault(weights: Weights, matrix: WeightName) -> tuple[str, str]:
     return f"/{matrix}" if isinstance(weights, ExplicitWeights) else "", WORKING_WEIGHTS
 
 
-def _stored(ident: str, request: DesignRequest, envelope: DesignedEnvelope) -> StoredDesign:
-    created_at = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-    document = design_document(ident, request.normalised(), created_at, envelope)
-    return StoredDesign(ident, request.name, created_at, code_version(), canonical(request), encode(document))
+def parts_of(request: DesignRequest) -> tuple[Part, ...]:
+    """What the making of a design takes long for, piece by piece.
+
+    Raises
+    ------
+    InvalidRequest : no point of the grid lies inside the model, or the model refuses the numbers
+    """
+    return _asked(study_of.study(request), parts)
+
+
+def synthesised(request: DesignRequest, part: Part) -> bytes:
+    """One of these pieces: the same bytes wherever it is made.
+
+    Raises
+    ------
+    InvalidRequest : the model refuses the numbers, or weights that cannot work
+    """
+    return _asked(study_of.study(request), lambda study: synthesise(study, part).to_bytes())
+
+
+def stored_design(
+    ident: str, request: DesignRequest, done: Sequence[bytes], created_at: float
+) -> tuple[StoredDesign, DesignedEnvelope]:
+    """The design of a request from all its pieces, in any order; `created_at` in seconds since 1970.
+
+    Raises
+    ------
+    InvalidRequest : the model refuses the numbers, or weights that cannot work
+    """
+    made = [Synthesised.from_bytes(piece) for piece in done]
+    envelope = _asked(study_of.study(request), partial(run, done=made) if made else run)
+    moment = datetime.fromtimestamp(created_at, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    answered = encode(design_document(ident, request.normalised(), moment, envelope))
+    kept = joined(done) if done else None
+    return StoredDesign(ident, request.name, moment, code_version(), canonical(request), answered, kept), envelope
 
 
 def _made_again(stored: StoredDesign) -> DesignedEnvelope:
-    envelope = designed(DesignRequest.model_validate_json(stored.request))
+    request = DesignRequest.model_validate_json(stored.request)
+    envelope = _from_parts(request, stored) or designed(request)
     answered = orjson.loads(stored.answer)["controllers"]
     for controller, before in zip(envelope.controllers, answered, strict=True):
         if not _same_gains(controller, before["gains"]):
@@ -191,6 +242,17 @@ def _made_again(stored: StoredDesign) -> DesignedEnvelope:
                 f"controller {controller.request.name} differ. Post its request again for a design of this version"
             )
     return envelope
+
+
+def _from_parts(request: DesignRequest, stored: StoredDesign) -> DesignedEnvelope | None:
+    """The envelope from the pieces it was made of; None where they are not kept, or of a code that cut otherwise."""
+    if stored.parts is None:
+        return None
+    try:
+        return run(study_of.study(request), [Synthesised.from_bytes(piece) for piece in cut(stored.parts)])
+    except ValueError as error:
+        log.warning("the parts of design %s are of no use", stored.id, exc_info=error)
+        return None
 
 
 def _same_gains(controller: DesignedController, answered: list[dict[str, object]]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,72 @@ LIMITS = {
     "max_compared_points": "1",
     "max_listed_designs": "1",
     "max_concurrent_designs": "1",
+    "job_work_factor": "1",
+    "max_queued_jobs": "1",
+    "max_running_jobs": "1",
+    "job_workers": "1",
 }
+
+#: Those that bound how long an answer takes: a job may be so many times as much (`Settings.job_work_factor`).
+WORK_LIMITS = (
+    "max_grid_points",
+    "max_point_designs",
+    "max_tab_only_designs",
+    "max_flown_loops",
+    "max_delayed_loops",
+    "max_swept_samples",
+    "max_simulated_steps",
+    "max_worst_case_rows",
+    "max_compared_samples",
+    "max_weight_searches",
+    "max_profile_steps",
+    "max_refined_points",
+    "max_proof_pieces",
+    "max_cross_checks",
+    "max_compared_points",
+)
+
+
+@dataclass(frozen=True)
+class WorkRefusal(FieldRefusal):
+    """More work than is done in line, of a kind that a job may do more of.
+
+    Attributes
+    ----------
+    limit : name of the limit
+    size : of the work
+    """
+
+    limit: str = ""
+    size: int = 0
+
+
+def of_jobs(settings: Settings) -> Settings:
+    """The same settings with the limits that hold for jobs."""
+    factor = settings.job_work_factor
+    return settings.model_copy(update={name: factor * getattr(settings, name) for name in WORK_LIMITS})
+
+
+def fits_in_a_job(refused: LimitExceeded, settings: Settings) -> bool:
+    """Whether work that is refused in line is within what a job may do.
+
+    Raises
+    ------
+    LimitExceeded : it is of such a kind, and above what a job may do; names that limit
+    """
+    if settings.job_work_factor == 1:
+        return False
+    works = [field for field in refused.fields if isinstance(field, WorkRefusal)]
+    for work in works:
+        most = settings.job_work_factor * int(getattr(settings, work.limit))
+        if work.size > most:
+            detail = (
+                f"{work.detail}; a job of this server does {most} at most, {settings.job_work_factor} times the limit "
+                f"{work.limit} (settings {setting_of('job_work_factor')}, {setting_of(work.limit)})"
+            )
+            allowed = f"<= {most} in a job"
+            raise LimitExceeded(detail, FieldRefusal(work.pointer, work.detail, work.unit, allowed)) from refused
+    return bool(works)
 
 
 def listed(settings: Settings) -> list[dict[str, Any]]:
@@ -84,7 +150,10 @@ def check_size(pointer: str, what: str, size: int, name: str, settings: Settings
     limit: int = getattr(settings, name)
     if size > limit:
         detail = f"{size} {what}; the limit {name} of this server is {limit} (setting {setting_of(name)})"
-        raise LimitExceeded(detail, FieldRefusal(pointer, f"{size} {what}", "1", f"<= {limit}"))
+        field = FieldRefusal(pointer, f"{size} {what}", "1", f"<= {limit}")
+        if name in WORK_LIMITS:
+            field = WorkRefusal(pointer, field.detail, field.unit, field.allowed, name, size)
+        raise LimitExceeded(detail, field)
 
 
 def check_grid(grid: flight.Grid, settings: Settings) -> int:

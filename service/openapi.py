@@ -11,7 +11,9 @@ from pydantic.json_schema import models_json_schema
 
 from service.body_examples import BODIES
 from service.errors import MEDIA_TYPE, STATUS, problem
+from service.jobs.refusals import JOB_STATUS
 from service.refusals import FieldRefusal
+from service.schemas.jobs import Job
 from service.schemas.problem import FieldProblem, Problem
 from service.units import state_units
 
@@ -28,6 +30,7 @@ _DETAILS = {
     413: "the body has more than 1048576 bytes, the limit max_body_bytes of this server",
     415: "the body is declared as 'text/plain'; send JSON with the header Content-Type: application/json",
     422: "/geometry/chord_m: must be greater than or equal to 0.001",
+    429: "100 jobs wait, the limit max_queued_jobs of this server (setting GAINFIELD_MAX_QUEUED_JOBS)",
     503: "the store does not answer: OperationalError",
 }
 
@@ -46,13 +49,20 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return {status: _documented(status) for status in statuses}
 
 
+def job_answers() -> dict[int | str, dict[str, Any]]:
+    """The `responses` of a route whose work may become a job."""
+    described = "A job does the work: `Prefer: respond-async` asked for it, or it is above a limit of the work in line"
+    return {202: {"model": Job, "description": described}, **problems(429, 503)}
+
+
 def shown_with(example: str) -> dict[str, Any]:
     """The `openapi_extra` of a route below a design that is shown with another example than the first."""
     return {_EXAMPLE: example}
 
 
 def _documented(status: int) -> dict[str, Any]:
-    titles = {code: title for number, code, title in STATUS.values() if number == status}
+    known = (*STATUS.values(), *JOB_STATUS.values())
+    titles = {code: title for number, code, title in known if number == status}
     code, title = next(iter(titles.items()))
     shown = problem(status, code, title, _DETAILS[status], [_FIELD] if status == 422 else [])
     return {
@@ -61,8 +71,11 @@ def _documented(status: int) -> dict[str, Any]:
     }
 
 
-def install(app: FastAPI, first_example: str, example_id: Callable[[str], str]) -> None:
-    """Complete the document of the app; `example_id` is the id that the design request of an example gets.
+def install(app: FastAPI, first_example: str, example_id: Callable[[str], str], example_job: Callable[[], str]) -> None:
+    """Complete the document of the app.
+
+    `example_id` is the id that the design request of an example gets, `example_job` that of the job that routes of jobs
+    are shown with.
 
     Routes below a design are shown with the first example, or the one that `shown_with` says.
     """
@@ -81,7 +94,9 @@ def install(app: FastAPI, first_example: str, example_id: Callable[[str], str]) 
                 schemas.pop(unused, None)
             for path, operations in document["paths"].items():
                 for method, operation in operations.items():
-                    _complete(path, method, operation, example_id(operation.pop(_EXAMPLE, first_example)))
+                    of_jobs = path.startswith("/v1/jobs")
+                    shown = example_job() if of_jobs else example_id(operation.pop(_EXAMPLE, first_example))
+                    _complete(path, method, operation, shown)
         return app.openapi_schema or {}
 
     app.openapi = openapi  # type: ignore[method-assign]

@@ -48,10 +48,21 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
+def prefers_async(request: Request) -> bool:
+    """Whether the client would rather have a job than wait (``Prefer: respond-async``, RFC 7240)."""
+    preferences = ",".join(request.headers.getlist("prefer")).split(",")
+    return any(each.partition(";")[0].strip().lower() == "respond-async" for each in preferences)
+
+
 class JsonRequest(Request):
     """A request whose body is read by `read_json`."""
 
     _document: Any = None
+
+    @property
+    def document(self) -> Any:
+        """The document, as read by `read`."""
+        return self._document
 
     async def json(self) -> Any:
         """The document, as read by `read`."""

@@ -102,4 +102,19 @@ class Settings(BaseSettings):
     max_compared_points: int = Field(default=200, ge=1, description="Grid points that two designs are compared at")
     max_listed_designs: int = Field(default=200, ge=1, description="Designs on one page of the list")
     max_concurrent_designs: int = Field(default=2, ge=1, description="Designs computed at the same time")
+    job_work_factor: int = Field(
+        default=40,
+        ge=1,
+        description="How many times the work in line a job may be: of the limits on grid points, designs, searches, "
+        "flown and delayed loops, samples, steps, rows, pieces of a proof and comparisons, not on sizes of answers",
+    )
+    max_queued_jobs: int = Field(default=100, ge=1, description="Jobs that wait at the same time")
+    max_running_jobs: int = Field(default=8, ge=1, description="Jobs that are worked on at the same time")
+    job_workers: int = Field(default=2, ge=1, le=256, description="Processes of this machine that work on jobs")
+    job_lease_s: float = Field(default=5.0, ge=0.5, le=600.0, allow_inf_nan=False)
+    dask: str | None = Field(default=None, description="Address of a Dask scheduler whose workers work on jobs instead")
+    dask_allow_insecure: bool = False
+    dask_ca_file: Path | None = None
+    dask_cert_file: Path | None = None
+    dask_key_file: Path | None = None
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

@@ -8,14 +8,18 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
 from service.answering import answer, encode
-from service.limits import check_design, check_size
-from service.openapi import BODY, problems
-from service.reading import JsonRoute
-from service.refusals import FieldRefusal, InvalidRequest
+from service.designs import design_id
+from service.jobs.deferral import accepted
+from service.jobs.kinds.design import design_job
+from service.limits import check_design, check_size, fits_in_a_job, of_jobs
+from service.openapi import BODY, job_answers, problems
+from service.reading import JsonRoute, prefers_async
+from service.refusals import FieldRefusal, InvalidRequest, LimitExceeded
 from service.schemas.design import Design, DesignList
 from service.schemas.requests import DesignRequest
 from service.schemas.wire import PARAMETERS
-from service.state import HEAVY, DesignsHere, SettingsHere
+from service.settings import Settings
+from service.state import HEAVY, DesignsHere, SettingsHere, owner_of, state_of
 
 router = APIRouter(prefix="/v1/designs", tags=["designs"], route_class=JsonRoute)
 
@@ -39,6 +43,7 @@ class Page(BaseModel):
     response_model=Design,
     responses={
         200: {"model": Design, "description": "The same request was answered before: the same bytes"},
+        **job_answers(),
         **problems(*BODY, 503),
     },
     dependencies=[HEAVY],
@@ -49,10 +54,32 @@ def create_design(request: Request, wanted: DesignRequest, designs: DesignsHere,
     The id is the hash of the request, defaults filled in, and of the code: the same request is answered with the
     same bytes. A point that cannot be designed carries an outcome with its reason and does not stop the others.
     """
-    check_design(wanted, settings)
+    if _to_be_a_job(request, wanted, settings):
+        ident, jobs = design_id(wanted), state_of(request).jobs
+        found = designs.known(ident)
+        if found is None and jobs is not None:
+            owner = owner_of(request)
+            return accepted(request, jobs.ask(design_job(wanted, owner), owner, again=True))
     design, new = designs.create(wanted)
     headers = {"Location": f"/v1/designs/{design.id}"}
     return answer(request, design.answer, 201 if new else 200, headers=headers)
+
+
+def _to_be_a_job(request: Request, wanted: DesignRequest, settings: Settings) -> bool:
+    """Whether the client prefers a job, or the work is too much in line.
+
+    Raises
+    ------
+    LimitExceeded : it is too much for a job, too
+    """
+    try:
+        check_design(wanted, settings)
+    except LimitExceeded as refused:
+        if not fits_in_a_job(refused, settings):
+            raise
+        check_design(wanted, of_jobs(settings))
+        return True
+    return prefers_async(request)
 
 
 @router.get("", response_model=DesignList, responses=problems(422, 503))

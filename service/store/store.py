@@ -14,6 +14,7 @@ from service.store.database import Database
 from service.store.designs import DesignStore
 from service.store.identity import same_store
 from service.store.integrity import Finding, findings
+from service.store.jobs import JobStore
 from service.store.orphans import sweep
 from service.store.retention import Kept, LetGo, let_go
 
@@ -59,6 +60,7 @@ class Store:
             self.database.close()
             raise
         self.designs = DesignStore(self.database, self.blobs)
+        self.jobs = JobStore(self.database, self.blobs)
         self.findings = self.inspect()
 
     def inspect(self, thorough: bool = False) -> tuple[Finding, ...]:

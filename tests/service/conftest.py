@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -14,6 +15,9 @@ from service.app import create_app
 from service.examples import example
 from service.schemas.problem import Problem
 from service.settings import Settings
+
+# Work above a limit is refused, not made a job, but in the tests of jobs, which say how much a job may do.
+os.environ.setdefault("GAINFIELD_JOB_WORK_FACTOR", "1")
 
 
 @pytest.fixture(scope="session")

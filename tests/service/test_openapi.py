@@ -12,6 +12,8 @@ from pydantic import TypeAdapter
 
 from service.design_examples import design_requests
 from service.errors import STATUS
+from service.jobs.example import EXAMPLE_PATH, example_body, example_job
+from service.jobs.refusals import JOB_STATUS
 from service.routes import ROUTERS
 from service.schemas.problem import Problem
 from tests.service.openapi_examples import address, operations
@@ -27,9 +29,16 @@ def document(client: TestClient) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def shown(client: TestClient, design: dict[str, Any]) -> list[str]:
-    """Ids of the designs that routes are shown with: the first example, and one that weighs power."""
+    """Ids of the designs that routes are shown with: the first example, and one that weighs power.
+
+    And the job that the routes of jobs are shown with has ended.
+    """
     response = client.post("/v1/designs", json=design_requests()["lqr_power"][1])
     assert response.status_code in (200, 201), response.text
+    job = client.post(EXAMPLE_PATH, json=example_body(), headers={"Prefer": "respond-async"})
+    assert (job.status_code, job.headers["location"]) == (202, f"/v1/jobs/{example_job()}")
+    with client.stream("GET", f"/v1/jobs/{example_job()}/events") as events:
+        assert "event: succeeded" in list(events.iter_lines())
     return [design["id"], response.json()["id"]]
 
 
@@ -86,6 +95,11 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/spec-packs"),
         ("get", "/v1/examples"),
         ("get", "/v1/examples/{name}"),
+        ("get", "/v1/jobs"),
+        ("get", "/v1/jobs/{id}"),
+        ("get", "/v1/jobs/{id}/events"),
+        ("get", "/v1/jobs/{id}/result"),
+        ("delete", "/v1/jobs/{id}"),
         ("get", "/v1/limits"),
         ("get", "/v1/version"),
         ("get", "/healthz"),
@@ -126,9 +140,9 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
     models = {(route.path, *map(str.lower, route.methods)): route.response_model for route in routes}
     checked = 0
     for path, method, operation in operations(document):
-        where, query = address(path, operation)
-        if method == "delete":
+        if method not in METHODS:
             continue
+        where, query = address(path, operation)
         if method == "post":
             (example, *_) = operation["requestBody"]["content"]["application/json"]["examples"].values()
             response = client.post(where, json=example["value"])
@@ -138,7 +152,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 50
+    assert checked == 52
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
@@ -149,6 +163,8 @@ def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
         for path, method, operation in operations(document)
         if "{id}" in path
     }
+    jobs = [ids.pop(path) for path in list(ids) if path.startswith("/v1/jobs")]
+    assert jobs == [[example_job()]] * 3
     power = "/v1/designs/{id}/controllers/{name}/power-comparison"
     assert ids.pop(power) == [shown[1]]
     assert set(map(tuple, ids.values())) == {(shown[0],)}
@@ -156,7 +172,7 @@ def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
 
 
 def test_every_error_is_declared_with_its_shape(document: dict[str, Any]) -> None:
-    known = {str(status) for status, _, _ in STATUS.values()}
+    known = {str(status) for status, _, _ in (*STATUS.values(), *JOB_STATUS.values())}
     for path, method, operation in operations(document):
         responses = operation["responses"]
         errors = {status: r for status, r in responses.items() if status[0] in "45"}
@@ -183,11 +199,10 @@ def test_references_lead_somewhere(document: dict[str, Any]) -> None:
 
 
 def test_every_operation_is_described(document: dict[str, Any]) -> None:
-    for path, _, operation in operations(document):
+    for path, method, operation in operations(document):
         assert operation.get("description"), path
         assert operation.get("tags"), path
-        responses = operation["responses"]
-        assert responses.get("304") or responses.get("204") or operation.get("requestBody"), path
+        assert operation["responses"].get("304") or operation.get("requestBody") or method == "delete", path
 
 
 def test_numbers_state_their_unit(document: dict[str, Any]) -> None:
