@@ -20,6 +20,11 @@ def encode(document: Any) -> bytes:
     return orjson.dumps(document, default=_encodable, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
+def line(document: Any) -> bytes:
+    """A line of JSON Lines."""
+    return encode(document) + b"\n"
+
+
 def _encodable(value: Any) -> Any:
     """What orjson takes instead of the arrays it does not take: strided, complex, of objects, of no axes."""
     if isinstance(value, np.ndarray):
@@ -46,9 +51,14 @@ def answer(
     """The answer with its entity tag; 304 and no body when the client has these very bytes already."""
     tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache", **(headers or {})}
-    if request.method == "GET" and _has(request.headers.get("if-none-match", ""), tag):
+    if unchanged(request, tag):
         return Response(status_code=304, headers=headers)
     return Response(body, status_code=status, media_type=media_type, headers=headers)
+
+
+def unchanged(request: Request, tag: str) -> bool:
+    """Whether the client has the answer of this entity tag."""
+    return request.method == "GET" and _has(request.headers.get("if-none-match", ""), tag)
 
 
 def _has(if_none_match: str, tag: str) -> bool:

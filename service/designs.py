@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import logging
 import time
@@ -27,6 +28,7 @@ from schedules.run import run
 from schedules.schedule import Provenance
 from schedules.study import PlantStudy, Study
 from service import study_of
+from service.access.principals import OPERATOR, Principal
 from service.answering import encode
 from service.envelopes import Envelopes
 from service.jobs.frames import cut, joined
@@ -72,11 +74,19 @@ def design_id(request: DesignRequest) -> str:
 
 
 class Designs:
-    """The designs of one server."""
+    """The designs of one server, all of them, or as one who asks sees them (`of`)."""
 
     def __init__(self, store: DesignStore, kept: int) -> None:
         self._store = store
         self._envelopes = Envelopes(kept)
+        self._asking = OPERATOR
+        self._check_room: Callable[[], None] = _boundless
+
+    def of(self, asking: Principal, check_room: Callable[[], None]) -> Designs:
+        """The same designs as this one sees them; `check_room` raises when there is no room for another of theirs."""
+        seen = copy.copy(self)
+        seen._asking, seen._check_room = asking, check_room
+        return seen
 
     def create(self, request: DesignRequest) -> tuple[StoredDesign, bool]:
         """The design of this request, and whether it is new; it is on the disk when this returns.
@@ -85,9 +95,14 @@ class Designs:
         ------
         InvalidRequest : no point of the grid lies inside the model, or the model refuses the numbers
         InvalidRequest : the weights of a controller cannot work
+        QuotaExceeded : it would be new to this owner, who has stored as much as may be
         """
-        ident = design_id(request)
-        found = self._store.get(ident)
+        ident, owner = design_id(request), self._asking.owner
+        found = self._store.get(ident, owner)
+        if found is not None:
+            return found, False
+        self._check_room()
+        found = self._store.own(ident, owner)
         if found is not None:
             return found, False
         made: list[tuple[StoredDesign, bool]] = []
@@ -95,19 +110,19 @@ class Designs:
         def make() -> DesignedEnvelope:
             done = [synthesised(request, part) for part in parts_of(request)]
             new, envelope = stored_design(ident, request, done, time.time())
-            kept = self._store.add(new)
+            kept = self._store.add(new, owner)
             made.append((kept, kept is new))
             return envelope
 
         self._envelopes.get(ident, make)
-        if not made and (found := self._store.get(ident)) is not None:
+        if not made and (found := self._store.own(ident, owner)) is not None:
             return found, False
         if not made:  # the envelope outlived its design
             make()
         return made[0]
 
     def known(self, ident: str) -> StoredDesign | None:
-        """The stored design, None when there is none."""
+        """The stored design, be it whose it may; None when there is none."""
         return self._store.get(ident)
 
     def find(self, ident: str) -> StoredDesign:
@@ -117,24 +132,24 @@ class Designs:
         ------
         NotFound
         """
-        found = self._store.get(ident)
+        found = self._store.get(ident, self._asking.sees)
         if found is None:
             raise NotFound(f"there is no design {ident[:80]!a}")
         return found
 
     def delete(self, ident: str) -> None:
-        """Forget a stored design.
+        """Let go of a stored design; one who sees everything takes it from all its owners.
 
         Raises
         ------
         NotFound
         """
-        if not self._store.delete(ident):
+        if not self._store.delete(ident, self._asking.sees):
             raise NotFound(f"there is no design {ident[:80]!a}")
 
     def page(self, limit: int, before: int | None) -> list[ListedDesign]:
         """Designs newest first, made before the one whose `seq` is given."""
-        return self._store.page(limit, before)
+        return self._store.page(limit, before, self._asking.sees)
 
     def ready(self, ident: str) -> bool:
         """Whether the envelope of this design is in memory."""
@@ -156,6 +171,10 @@ class Designs:
         stored = self.find(ident)
         digest = hashlib.sha256(stored.request).hexdigest()
         return Provenance(stored.id, stored.name, digest, stored.version, stored.created_at)
+
+
+def _boundless() -> None:
+    """There is room for everything."""
 
 
 def _asked(study: StudyKind, function: Callable[[StudyKind], Result]) -> Result:

@@ -24,14 +24,25 @@ MAX_FIELDS = 50
 #: Exception -> status, code, title. The one place where a refusal meets HTTP.
 STATUS: dict[type[Exception], tuple[int, str, str]] = {
     refusals.UnreadableBody: (400, "unreadable_body", "The body cannot be read"),
+    refusals.Unauthenticated: (401, "unauthenticated", "A key is needed"),
+    refusals.NotAllowed: (403, "not_allowed", "The key does not allow this"),
     refusals.NotFound: (404, "not_found", "There is no such thing here"),
+    refusals.NotAcceptable: (406, "not_acceptable", "The answer has no form that the client takes"),
     refusals.NoDesignAtPoint: (409, "no_design_at_point", "The controller has no gains at this point"),
     refusals.StudyNotPossible: (409, "study_not_possible", "The study is not possible for this controller"),
     refusals.StaleDesign: (409, "stale_design", "The design was made by another version"),
+    refusals.RepeatedTooSoon: (409, "repeated_too_soon", "The same request is being answered"),
+    refusals.NoResult: (409, "no_result", "The job has no result"),
     refusals.BodyTooLarge: (413, "body_too_large", "The body is too large"),
+    refusals.QuotaExceeded: (413, "quota_exceeded", "The owner has stored as much as the key allows"),
     refusals.UnsupportedMediaType: (415, "unsupported_media_type", "The body is not declared as JSON"),
     refusals.InvalidRequest: (422, "invalid_request", "The request cannot be taken"),
     refusals.LimitExceeded: (422, "limit_exceeded", "The request asks for more than this server does"),
+    refusals.RepeatedDifferently: (422, "repeated_differently", "The Idempotency-Key is not of this request"),
+    refusals.TooManyRequests: (429, "too_many_requests", "Too many requests"),
+    refusals.QueueFull: (429, "queue_full", "Too many jobs wait"),
+    refusals.NotReady: (503, "not_ready", "The server cannot work now"),
+    refusals.Overloaded: (503, "overloaded", "The server has more to compute than it can"),
     refusals.StoreUnavailable: (503, "store_unavailable", "The store of designs does not answer"),
 }
 
@@ -62,7 +73,22 @@ def problem_response(document: dict[str, Any], headers: dict[str, str] | None = 
 
 def refusal_response(refusal: refusals.Refusal) -> Response:
     """The answer to a refusal, by the table."""
-    return problem_response(problem(*STATUS[type(refusal)], refusal.detail, refusal.fields))
+    return problem_response(problem(*STATUS[type(refusal)], refusal.detail, refusal.fields), _headers(refusal))
+
+
+def _headers(refusal: refusals.Refusal) -> dict[str, str]:
+    """What a client reads of a refusal without its body."""
+    headers = {} if refusal.wait is None else {"Retry-After": str(refusal.wait)}
+    if isinstance(refusal, refusals.Unauthenticated):
+        headers["WWW-Authenticate"] = 'Bearer realm="gainfield"'
+    if isinstance(refusal, refusals.TooManyRequests) and refusal.allowance is not None:
+        headers |= rate_headers(*refusal.allowance)
+    return headers
+
+
+def rate_headers(limit: int, left: int, wait: int) -> dict[str, str]:
+    """What is left of a rate: requests in a minute, of these left, and until there are more [s]."""
+    return {"RateLimit-Policy": f'"minute";q={limit};w=60', "RateLimit": f'"minute";r={left};t={wait}'}
 
 
 def install(app: FastAPI) -> None:

@@ -57,6 +57,9 @@ LIMITS = {
     "max_queued_jobs": "1",
     "max_running_jobs": "1",
     "job_workers": "1",
+    "max_waiting_designs": "1",
+    "max_connections": "1",
+    "max_repeatable_answers": "1",
 }
 
 #: Those that bound how long an answer takes: a job may be so many times as much (`Settings.job_work_factor`).

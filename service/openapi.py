@@ -9,9 +9,10 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic.json_schema import models_json_schema
 
+from service.access.door import OPEN
 from service.body_examples import BODIES
 from service.errors import MEDIA_TYPE, STATUS, problem
-from service.jobs.refusals import JOB_STATUS
+from service.http.repeats import HEADER, LONGEST_KEY
 from service.refusals import FieldRefusal
 from service.schemas.jobs import Job
 from service.schemas.problem import FieldProblem, Problem
@@ -30,6 +31,9 @@ _DETAILS = {
     413: "the body has more than 1048576 bytes, the limit max_body_bytes of this server",
     415: "the body is declared as 'text/plain'; send JSON with the header Content-Type: application/json",
     422: "/geometry/chord_m: must be greater than or equal to 0.001",
+    401: "this server asks for a key: Authorization: Bearer gf_<id>_<secret>, or X-API-Key",
+    403: "this needs a key of scope write; the key shown has scope read",
+    406: "Accept: none of the media types of 'text/html' is one of this answer",
     429: "100 jobs wait, the limit max_queued_jobs of this server (setting GAINFIELD_MAX_QUEUED_JOBS)",
     503: "the store does not answer: OperationalError",
 }
@@ -61,8 +65,7 @@ def shown_with(example: str) -> dict[str, Any]:
 
 
 def _documented(status: int) -> dict[str, Any]:
-    known = (*STATUS.values(), *JOB_STATUS.values())
-    titles = {code: title for number, code, title in known if number == status}
+    titles = {code: title for number, code, title in STATUS.values() if number == status}
     code, title = next(iter(titles.items()))
     shown = problem(status, code, title, _DETAILS[status], [_FIELD] if status == 422 else [])
     return {
@@ -71,12 +74,15 @@ def _documented(status: int) -> dict[str, Any]:
     }
 
 
-def install(app: FastAPI, first_example: str, example_id: Callable[[str], str], example_job: Callable[[], str]) -> None:
+def install(
+    app: FastAPI, first_example: str, example_id: Callable[[str], str], example_job: Callable[[], str], keys: bool
+) -> None:
     """Complete the document of the app.
 
     `example_id` is the id that the design request of an example gets, `example_job` that of the job that routes of jobs
     are shown with.
 
+    `keys` is whether the server asks for keys.
     Routes below a design are shown with the first example, or the one that `shown_with` says.
     """
     plain = app.openapi
@@ -94,12 +100,48 @@ def install(app: FastAPI, first_example: str, example_id: Callable[[str], str], 
                 schemas.pop(unused, None)
             for path, operations in document["paths"].items():
                 for method, operation in operations.items():
+                    _common_refusals(method, operation)
+                    if keys and path not in OPEN:
+                        _secure(operation)
                     of_jobs = path.startswith("/v1/jobs")
                     shown = example_job() if of_jobs else example_id(operation.pop(_EXAMPLE, first_example))
                     _complete(path, method, operation, shown)
+            if keys:
+                document["components"]["securitySchemes"] = _SCHEMES
         return app.openapi_schema or {}
 
     app.openapi = openapi  # type: ignore[method-assign]
+
+
+#: How a client shows its key.
+_SCHEMES = {
+    "bearer": {"type": "http", "scheme": "bearer", "description": "A key `gf_<id>_<secret>`"},
+    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key", "description": "The same key"},
+}
+_IDEMPOTENCY = {
+    "name": HEADER,
+    "in": "header",
+    "required": False,
+    "schema": {"type": "string", "minLength": 1, "maxLength": LONGEST_KEY, "title": HEADER},
+    "description": "Sent again with the same key within 24 h, the request is answered as the first time",
+}
+
+
+def _common_refusals(method: str, operation: dict[str, Any]) -> None:
+    """What any route may refuse: an answer in no form that the client takes; a repeated POST, a POST too many."""
+    responses = operation["responses"]
+    responses.setdefault("406", _documented(406))
+    responses.setdefault("429", _documented(429))
+    if method == "post":
+        operation.setdefault("parameters", []).append(_IDEMPOTENCY)
+        responses.setdefault("409", _documented(409))
+
+
+def _secure(operation: dict[str, Any]) -> None:
+    """What a route answers when keys are asked for."""
+    operation["security"] = [{name: []} for name in _SCHEMES]
+    for status in (401, 403):
+        operation["responses"].setdefault(str(status), _documented(status))
 
 
 def _complete(path: str, method: str, operation: dict[str, Any], example_id: str) -> None:

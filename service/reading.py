@@ -10,6 +10,7 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from starlette.requests import ClientDisconnect
 
+from service.http.repeats import answered_once
 from service.refusals import UnreadableBody, UnsupportedMediaType
 
 #: Deeper nesting than any request has, shallow enough for every parser and validator behind.
@@ -97,6 +98,6 @@ class JsonRoute(APIRoute):
         async def read_then_handle(request: Request) -> Response:
             document = JsonRequest(request.scope, request.receive)
             await document.read()
-            return await handle(document)
+            return await answered_once(document, lambda: handle(document))
 
         return read_then_handle if self.body_field else handle

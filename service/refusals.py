@@ -24,12 +24,13 @@ class FieldRefusal:
 
 
 class Refusal(Exception):
-    """Base of what the service refuses: a sentence, and the fields it is about."""
+    """Base of what the service refuses: a sentence, the fields it is about, and when to ask again [s]."""
 
-    def __init__(self, detail: str, *fields: FieldRefusal) -> None:
+    def __init__(self, detail: str, *fields: FieldRefusal, wait: int | None = None) -> None:
         super().__init__(detail)
         self.detail = detail
         self.fields = fields
+        self.wait = wait
 
 
 class UnreadableBody(Refusal):
@@ -52,6 +53,46 @@ class BodyTooLarge(Refusal):
     """The body has more bytes than this server takes."""
 
 
+class Unauthenticated(Refusal):
+    """No key where one is asked for, or one that opens nothing."""
+
+
+class NotAllowed(Refusal):
+    """The scope of the key does not hold this."""
+
+
+class TooManyRequests(Refusal):
+    """More requests than the key or the address has; `allowance` is the limit, what is left and the wait [s]."""
+
+    def __init__(self, detail: str, wait: int, allowance: tuple[int, int, int] | None = None) -> None:
+        super().__init__(detail, wait=wait)
+        self.allowance = allowance
+
+
+class QuotaExceeded(Refusal):
+    """The owner has stored as much as the key allows."""
+
+
+class NotReady(Refusal):
+    """Something that the server needs is not well; a field names each, and why."""
+
+
+class Overloaded(Refusal):
+    """More requests wait for a computation than this server lets wait."""
+
+
+class NotAcceptable(Refusal):
+    """The client takes none of the media types that this is answered in."""
+
+
+class RepeatedDifferently(Refusal):
+    """The `Idempotency-Key` was used for another request, or is none."""
+
+
+class RepeatedTooSoon(Refusal):
+    """The first request with this `Idempotency-Key` is being answered."""
+
+
 class NotFound(Refusal):
     """No such design, controller, point or file."""
 
@@ -66,6 +107,14 @@ class StudyNotPossible(Refusal):
 
 class StaleDesign(Refusal):
     """The stored design was made by other code, and this code would answer differently."""
+
+
+class NoResult(Refusal):
+    """The job has no result, or none yet; the detail says which."""
+
+
+class QueueFull(Refusal):
+    """As many jobs wait as this server takes."""
 
 
 class StoreUnavailable(Refusal):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 from pydantic import Field, SecretStr
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -20,6 +21,19 @@ class Settings(BaseSettings):
     retention_days: float | None = Field(default=None, gt=0, description="Days that an unused design is kept")
     max_stored_bytes: int | None = Field(default=None, ge=0, description="Bytes of all designs that are kept")
     job_retention_days: float = Field(default=7.0, gt=0, description="Days that a job is kept after its end")
+    housekeeping_s: float = Field(default=300.0, ge=1.0, le=86_400.0)
+    require_keys: bool | None = None
+    allow_anonymous: bool = False
+    anonymous_requests_per_minute: int | None = Field(default=None, ge=1)
+    workers: int = Field(default=1, ge=1, le=64)
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    head_timeout_s: float = Field(default=10.0, gt=0.0, le=3600.0)
+    body_timeout_s: float = Field(default=10.0, gt=0.0, le=3600.0)
+    min_body_rate_b_s: int = Field(default=4096, ge=1)
+    idle_timeout_s: float = Field(default=15.0, gt=0.0, le=3600.0)
+    stalled_answer_timeout_s: float = Field(default=60.0, gt=0.0, le=3600.0)
+    shutdown_timeout_s: int = Field(default=20, ge=1, le=3600)
+    min_free_bytes: int = Field(default=64 << 20, ge=0)
     max_body_bytes: int = Field(default=1 << 20, ge=1024, description="Bytes of a request body")
     max_grid_points: int = Field(default=2500, ge=1, description="Points of a grid")
     max_controllers: int = Field(default=16, ge=1, description="Controllers of a design")
@@ -117,4 +131,9 @@ class Settings(BaseSettings):
     dask_ca_file: Path | None = None
     dask_cert_file: Path | None = None
     dask_key_file: Path | None = None
+    max_waiting_designs: int = Field(default=200, ge=1, description="Requests that wait for a computation")
+    max_connections: int = Field(default=4096, ge=8, description="Connections of a server process at the same time")
+    max_repeatable_answers: int = Field(
+        default=10_000, ge=1, description="Answers of an owner kept for their Idempotency-Key, for 24 h each"
+    )
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")

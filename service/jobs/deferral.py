@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import copy
 import hashlib
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from functools import wraps
+from functools import partial, wraps
+from inspect import iscoroutinefunction
 from typing import Any
 
 import orjson
 from fastapi import APIRouter, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 
 from service.answering import JSON
 from service.jobs.document import job_document
+from service.jobs.jobs import RETRY_AFTER
 from service.jobs.kinds.answer import answer_job, asked
-from service.jobs.refusals import RETRY_AFTER
 from service.limits import LIMITS, fits_in_a_job, of_jobs
 from service.openapi import job_answers
 from service.reading import JsonRequest, prefers_async
 from service.refusals import LimitExceeded, NotFound
-from service.state import ALWAYS_HEAVY, HEAVY, State, owner_of, state_of
+from service.state import ALWAYS_HEAVY, HEAVY, State, principal_of, state_of
 from service.store.designs import StoredDesign
 from service.store.jobs import Job
 from service.version import code_version
@@ -61,25 +63,28 @@ def _deferrable(route: APIRoute) -> APIRoute:
     return deferred
 
 
-def _deferring(endpoint: Callable[..., Response]) -> Callable[..., Response]:
+def _deferring(endpoint: Callable[..., Any]) -> Callable[..., Awaitable[Response]]:
     """The endpoint, which is reached when the request is valid: a job instead, or its own answer."""
+    of_its_own = iscoroutinefunction(endpoint)
 
     @wraps(endpoint)
-    def answered(**values: Any) -> Response:
+    async def answered(**values: Any) -> Response:
         request: Request = values["request"]
         state = state_of(request)
-        if state.jobs is None:
-            return endpoint(**values)
-        if prefers_async(request):
-            return accepted(request, _job(request, state))
+        if state.jobs is not None and prefers_async(request):
+            return await run_in_threadpool(_accepted, request, state)
         try:
-            return endpoint(**values)
+            return await (endpoint(**values) if of_its_own else run_in_threadpool(endpoint, **values))
         except LimitExceeded as refused:
-            if not fits_in_a_job(refused, state.settings):
+            if state.jobs is None or not fits_in_a_job(refused, state.settings):
                 raise
-        return accepted(request, _job(request, state))
+        return await run_in_threadpool(_accepted, request, state)
 
     return answered
+
+
+def _accepted(request: Request, state: State) -> Response:
+    return accepted(request, _job(request, state))
 
 
 def _job(request: Request, state: State) -> Job:
@@ -88,25 +93,27 @@ def _job(request: Request, state: State) -> Job:
     Raises
     ------
     NotFound : of a design that the request names
-    QueueFull
+    QueueFull, QuotaExceeded
     """
     assert state.jobs is not None
+    asking = principal_of(request)
+    state.door.check_room(asking)
     body = request.document if isinstance(request, JsonRequest) else None
     what = (request.method, request.scope["path"], request.scope["query_string"].decode("latin-1"), body)
-    owner = owner_of(request)
-    ident = answer_id(owner, *what)
+    ident = answer_id(asking.owner, *what)
     limits = of_jobs(state.settings)
     given = _designs(request, state, body)
     new = answer_job(asked(*what), ident, given, {name: getattr(limits, name) for name in LIMITS})
-    return state.jobs.ask(new, owner, again=False)
+    return state.jobs.ask(new, asking.owner, again=False)
 
 
 def _designs(request: Request, state: State, body: Any) -> dict[str, StoredDesign]:
     """The designs that a request names: by path, by query, and in its body."""
+    seen = state.designs.of(principal_of(request), partial(state.door.check_room, principal_of(request)))
     named = [request.path_params.get("id"), request.query_params.get("with")]
-    found = {ident: state.designs.find(ident) for ident in named if ident is not None}
+    found = {ident: seen.find(ident) for ident in named if ident is not None}
     ident = body.get("design_id") if isinstance(body, dict) else None
     if isinstance(ident, str):
         with suppress(NotFound):  # the route has words for it that point into the body
-            found[ident] = state.designs.find(ident)
+            found[ident] = seen.find(ident)
     return found

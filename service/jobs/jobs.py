@@ -6,13 +6,15 @@ from functools import partial
 
 from service.jobs.dask_cluster import check_address
 from service.jobs.executors import executor
-from service.jobs.refusals import QueueFull
 from service.jobs.runner import Runner
 from service.limits import setting_of
-from service.refusals import FieldRefusal, NotFound
+from service.refusals import FieldRefusal, NotFound, QueueFull
 from service.settings import Settings
 from service.store.jobs import Job, NewJob
 from service.store.store import Store
+
+#: How long a client may wait before it asks again for a job, or for room in the queue [s].
+RETRY_AFTER = 1
 
 
 class Jobs:
@@ -24,9 +26,7 @@ class Jobs:
     """
 
     def __init__(self, store: Store, settings: Settings) -> None:
-        if settings.dask is not None:
-            files = (settings.dask_ca_file, settings.dask_cert_file, settings.dask_key_file)
-            check_address(settings.dask, None not in files, settings.dask_allow_insecure)
+        check_workers(settings)
         self._store = store
         self._most_queued = settings.max_queued_jobs
         start = partial(executor, settings)
@@ -48,7 +48,8 @@ class Jobs:
         if job is None:
             limit = f"the limit max_queued_jobs of this server (setting {setting_of('max_queued_jobs')})"
             detail = f"{self._most_queued} jobs wait, {limit}"
-            raise QueueFull(detail, FieldRefusal("", detail, "1", f"< {self._most_queued} waiting jobs"))
+            allowed = f"< {self._most_queued} waiting jobs"
+            raise QueueFull(detail, FieldRefusal("", detail, "1", allowed), wait=RETRY_AFTER)
         self._runner.wake()
         return job
 
@@ -83,6 +84,18 @@ class Jobs:
     def result(self, job: Job) -> bytes:
         """The bytes that a job was finished with."""
         return self._store.jobs.result(job)
+
+
+def check_workers(settings: Settings) -> None:
+    """Refuse settings that name a cluster that is not safe to use.
+
+    Raises
+    ------
+    ValueError
+    """
+    if settings.dask is not None:
+        files = (settings.dask_ca_file, settings.dask_cert_file, settings.dask_key_file)
+        check_address(settings.dask, None not in files, settings.dask_allow_insecure)
 
 
 def _there(job: Job | None, ident: str) -> Job:

@@ -10,11 +10,12 @@ from typing import Any
 from urllib.parse import quote
 
 import anyio
-from anyio import Semaphore
-from fastapi import FastAPI
+from anyio import CapacityLimiter, Semaphore
 from starlette.types import Message, Scope
 
-from service.app import create_app
+from service.access.door import Admitted, Door
+from service.access.principals import OPERATOR, Principal
+from service.app import Application, create_app
 from service.designs import Designs
 from service.settings import Settings
 from service.state import State
@@ -35,8 +36,23 @@ def replayed(
     written = json.dumps(limits, sort_keys=True)
     app, store = _app(written, get_ident()), _GivenStore(designs)
     kept = Designs(store.designs, len(designs) + 1)
-    app.state.shared = State(_settings(written), store, kept, Semaphore(1), None)
+    settings = _settings(written)
+    shared = State(settings, store, kept, Semaphore(1), CapacityLimiter(1), _OpenDoor(), app.metrics, None)
+    app.state.shared = shared
     return anyio.run(_answered, app, request)
+
+
+class _OpenDoor(Door):
+    """Who asked was let in, and found to have room, where the request came from."""
+
+    def __init__(self) -> None:
+        pass
+
+    async def admit(self, scope: Scope) -> Admitted:
+        return Admitted(OPERATOR)
+
+    def check_room(self, principal: Principal) -> None:
+        return None
 
 
 class _GivenDesigns(DesignStore):
@@ -62,11 +78,11 @@ def _settings(limits: str) -> Settings:
 
 # One for each thread of a worker, since it holds what belongs to the one request it answers.
 @lru_cache(maxsize=8)
-def _app(limits: str, thread: int) -> FastAPI:
+def _app(limits: str, thread: int) -> Application:
     return create_app(_settings(limits))
 
 
-async def _answered(app: FastAPI, request: Mapping[str, Any]) -> tuple[int, dict[str, str], bytes]:
+async def _answered(app: Application, request: Mapping[str, Any]) -> tuple[int, dict[str, str], bytes]:
     body = request["body"]
     scope: Scope = {
         "type": "http",

@@ -21,6 +21,7 @@ from service.routes import (
     linear_models,
     meta,
     norms,
+    operations,
     phase_plane,
     points,
     power_comparison,
@@ -82,5 +83,6 @@ ROUTERS = tuple(
         spec_packs.router,
         examples.router,
         meta.router,
+        operations.router,
     )
 )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import partial
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from service.answering import answer, encode
+from service.answering import answer, encode, line
 from service.designs import design_id
+from service.http.negotiation import JSON, JSON_LINES, accepted_by, preferred
 from service.jobs.deferral import accepted
 from service.jobs.kinds.design import design_job
 from service.limits import check_design, check_size, fits_in_a_job, of_jobs
@@ -19,7 +21,7 @@ from service.schemas.design import Design, DesignList
 from service.schemas.requests import DesignRequest
 from service.schemas.wire import PARAMETERS
 from service.settings import Settings
-from service.state import HEAVY, DesignsHere, SettingsHere, owner_of, state_of
+from service.state import HEAVY, DesignsHere, SettingsHere, principal_of, read, state_of
 
 router = APIRouter(prefix="/v1/designs", tags=["designs"], route_class=JsonRoute)
 
@@ -55,10 +57,12 @@ def create_design(request: Request, wanted: DesignRequest, designs: DesignsHere,
     same bytes. A point that cannot be designed carries an outcome with its reason and does not stop the others.
     """
     if _to_be_a_job(request, wanted, settings):
-        ident, jobs = design_id(wanted), state_of(request).jobs
+        state, principal = state_of(request), principal_of(request)
+        ident, jobs = design_id(wanted), state.jobs
         found = designs.known(ident)
         if found is None and jobs is not None:
-            owner = owner_of(request)
+            state.door.check_room(principal)
+            owner = principal.owner
             return accepted(request, jobs.ask(design_job(wanted, owner), owner, again=True))
     design, new = designs.create(wanted)
     headers = {"Location": f"/v1/designs/{design.id}"}
@@ -82,13 +86,18 @@ def _to_be_a_job(request: Request, wanted: DesignRequest, settings: Settings) ->
     return prefers_async(request)
 
 
-@router.get("", response_model=DesignList, responses=problems(422, 503))
-def list_designs(
+_LINES: dict[int | str, dict[str, Any]] = {
+    200: {"model": DesignList, "description": "A page; as JSON Lines, a design a line", "content": {JSON_LINES: {}}}
+}
+
+
+@router.get("", response_model=DesignList, responses=_LINES | problems(422, 503))
+async def list_designs(
     request: Request, page: Annotated[Page, Query()], designs: DesignsHere, settings: SettingsHere
 ) -> Response:
     """Designs, newest first, a page at a time."""
     check_size("/limit", "designs on a page", page.limit, "max_listed_designs", settings)
-    found = designs.page(page.limit + 1, _before(page.cursor))
+    found = await read(request, partial(designs.page, page.limit + 1, _before(page.cursor)))
     more = len(found) > page.limit
     items = [
         {
@@ -101,7 +110,10 @@ def list_designs(
         for one in found[: page.limit]
     ]
     next_cursor = f"d{found[page.limit - 1].seq}" if more else None
-    headers = {"Link": f'</v1/designs?limit={page.limit}&cursor={next_cursor}>; rel="next"'} if more else None
+    headers = {"Link": f'</v1/designs?limit={page.limit}&cursor={next_cursor}>; rel="next"'} if more else {}
+    headers["Vary"] = "Accept"
+    if preferred(accepted_by(request), (JSON, JSON_LINES)) == JSON_LINES:
+        return answer(request, b"".join(map(line, items)), media_type=JSON_LINES, headers=headers)
     return answer(request, encode({"items": items, "next_cursor": next_cursor}), headers=headers)
 
 
@@ -123,13 +135,13 @@ def _before(cursor: str | None) -> int | None:
 
 
 @router.get("/{id}", response_model=Design, responses=problems(404, 503))
-def read_design(request: Request, ident: DesignId, designs: DesignsHere) -> Response:
+async def read_design(request: Request, ident: DesignId, designs: DesignsHere) -> Response:
     """The design, byte for byte as it was first answered."""
-    return answer(request, designs.find(ident).answer)
+    return await read(request, lambda: answer(request, designs.find(ident).answer))
 
 
 @router.delete("/{id}", status_code=204, responses=problems(404, 503))
-def delete_design(ident: DesignId, designs: DesignsHere) -> Response:
+async def delete_design(request: Request, ident: DesignId, designs: DesignsHere) -> Response:
     """Forget the design. It is gone when it has no other owner; its request, posted again, is designed again."""
-    designs.delete(ident)
+    await read(request, lambda: designs.delete(ident))
     return Response(status_code=204)

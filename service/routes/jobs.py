@@ -13,15 +13,14 @@ from pydantic import BaseModel, Field
 
 from service.answering import JSON, answer, encode
 from service.jobs.document import job_document
-from service.jobs.jobs import Jobs
+from service.jobs.jobs import RETRY_AFTER, Jobs
 from service.jobs.kinds.answer import kept_answer
-from service.jobs.refusals import NoResult
 from service.limits import check_size
 from service.openapi import problems
-from service.refusals import NotFound
+from service.refusals import NoResult, NotFound
 from service.schemas.jobs import Job, JobList
 from service.schemas.wire import PARAMETERS
-from service.state import SettingsHere, owner_of, state_of
+from service.state import SettingsHere, principal_of, state_of
 from service.store.jobs import Job as StoredJob
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
@@ -45,7 +44,7 @@ JobsHere = Annotated[Jobs, Depends(jobs_of)]
 
 def job_here(request: Request, ident: JobId, jobs: JobsHere) -> StoredJob:
     """The job that the path names."""
-    return jobs.find(ident, owner_of(request))
+    return jobs.find(ident, principal_of(request).sees)
 
 
 JobHere = Annotated[StoredJob, Depends(job_here)]
@@ -67,7 +66,7 @@ def list_jobs(request: Request, page: Annotated[Page, Query()], jobs: JobsHere, 
     """Jobs, newest first, a page at a time."""
     check_size("/limit", "jobs on a page", page.limit, "max_listed_designs", settings)
     before = None if page.cursor is None else int(page.cursor[1:])
-    found = jobs.page(page.limit + 1, before, owner_of(request))
+    found = jobs.page(page.limit + 1, before, principal_of(request).sees)
     shown, more = found[: page.limit], len(found) > page.limit
     next_cursor = f"j{shown[-1].seq}" if more else None
     headers = {"Link": f'</v1/jobs?limit={page.limit}&cursor={next_cursor}>; rel="next"'} if more else None
@@ -124,7 +123,8 @@ def job_result(request: Request, job: JobHere, jobs: JobsHere) -> Response:
     """The result of a job that succeeded: the very bytes that the request would have been answered with in line."""
     if job.state != "succeeded" or job.result is None:
         why = "; the document of the job says why" if job.ended else "; it is not finished yet"
-        raise NoResult(f"the job {job.id} is {job.state}{why}")
+        wait = None if job.ended else RETRY_AFTER
+        raise NoResult(f"the job {job.id} is {job.state}{why}", wait=wait)
     if job.result_blob is None:
         ident = job.result.rpartition("/")[2]
         design = state_of(request).designs.find(ident)

@@ -1,4 +1,4 @@
-"""The server about itself: health, version, limits, and where to begin."""
+"""The server about itself: version, limits, and where to begin."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fastapi.responses import RedirectResponse
 from service.answering import answer, encode
 from service.limits import listed
 from service.openapi import problems
-from service.schemas.meta import Health, Limits, Version
+from service.schemas.meta import Limits, Version
 from service.state import SettingsHere
 from service.version import code_version, release, solver
 
@@ -23,14 +23,8 @@ def beginning() -> RedirectResponse:
     return RedirectResponse("docs")
 
 
-@router.get("/healthz", response_model=Health, responses=problems())
-def health(request: Request) -> Response:
-    """The process is up."""
-    return answer(request, encode({"status": "ok"}))
-
-
 @router.get("/v1/version", response_model=Version, responses=problems())
-def version(request: Request) -> Response:
+async def version(request: Request) -> Response:
     """Release, digest of the sources, and the numerical libraries."""
     document = {
         "name": "Gainfield",
@@ -43,6 +37,6 @@ def version(request: Request) -> Response:
 
 
 @router.get("/v1/limits", response_model=Limits, responses=problems())
-def limits(request: Request, settings: SettingsHere) -> Response:
+async def limits(request: Request, settings: SettingsHere) -> Response:
     """What this server takes, and the settings that say so."""
     return answer(request, encode({"limits": listed(settings)}))

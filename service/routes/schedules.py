@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from typing import Annotated, Any, Literal, get_args
 
-from fastapi import APIRouter, Depends, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
 from schedules.files import (
@@ -27,7 +25,7 @@ from service.openapi import problems
 from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound
 from service.routes.designs import DesignId
 from service.schemas.wire import PARAMETERS
-from service.state import DesignsHere, SettingsHere, own_slot, slot
+from service.state import HEAVY, DesignsHere, SettingsHere
 from service.verification_of import origin_of, summary_of
 
 router = APIRouter(prefix="/v1/designs/{id}/schedules", tags=["schedules"])
@@ -67,18 +65,11 @@ class Options(BaseModel):
     )
 
 
-async def _slot(request: Request) -> AsyncIterator[None]:
-    """A place among the computations, be the design ready or not, where a proof is asked for."""
-    place = own_slot if "certificate" in request.query_params else slot
-    async with asynccontextmanager(place)(request):
-        yield
-
-
 @router.get(
     "/{controller}.{suffix}",
     response_class=Response,
     responses=_FILE | problems(404, 409, 422, 503),
-    dependencies=[Depends(_slot, scope="function")],
+    dependencies=[HEAVY],
 )
 def download_schedule(
     request: Request,

@@ -16,6 +16,13 @@ class Health(Answer):
     status: Literal["ok"]
 
 
+class Readiness(Answer):
+    """The server can work; `checks` is what was looked at."""
+
+    status: Literal["ready"]
+    checks: list[str]
+
+
 class Version(Answer):
     """Which code answers, and with which numerical libraries."""
 

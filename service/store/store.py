@@ -15,7 +15,9 @@ from service.store.designs import DesignStore
 from service.store.identity import same_store
 from service.store.integrity import Finding, findings
 from service.store.jobs import JobStore
+from service.store.keys import KeyStore
 from service.store.orphans import sweep
+from service.store.repeated import RepeatedStore
 from service.store.retention import Kept, LetGo, let_go
 
 #: Directory of the content-addressed files, in the data directory.
@@ -61,6 +63,8 @@ class Store:
             raise
         self.designs = DesignStore(self.database, self.blobs)
         self.jobs = JobStore(self.database, self.blobs)
+        self.keys = KeyStore(self.database)
+        self.repeated = RepeatedStore(self.database, self.blobs)
         self.findings = self.inspect()
 
     def inspect(self, thorough: bool = False) -> tuple[Finding, ...]:

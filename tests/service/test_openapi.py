@@ -13,7 +13,6 @@ from pydantic import TypeAdapter
 from service.design_examples import design_requests
 from service.errors import STATUS
 from service.jobs.example import EXAMPLE_PATH, example_body, example_job
-from service.jobs.refusals import JOB_STATUS
 from service.routes import ROUTERS
 from service.schemas.problem import Problem
 from tests.service.openapi_examples import address, operations
@@ -51,6 +50,7 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/designs"),
         ("get", "/v1/designs/{id}"),
         ("delete", "/v1/designs/{id}"),
+        ("get", "/v1/designs/{id}/points"),
         ("get", "/v1/designs/{id}/points/{index}"),
         ("get", "/v1/designs/{id}/controllers/{name}/root-locus"),
         ("get", "/v1/designs/{id}/controllers/{name}/response"),
@@ -103,6 +103,8 @@ def test_the_routes_of_the_contract(document: dict[str, Any]) -> None:
         ("get", "/v1/limits"),
         ("get", "/v1/version"),
         ("get", "/healthz"),
+        ("get", "/readyz"),
+        ("get", "/metrics"),
     }
 
 
@@ -152,7 +154,7 @@ def test_answers_are_what_their_models_say(client: TestClient, document: dict[st
         if model is not None:
             TypeAdapter(model).validate_python(response.json(), strict=True)
             checked += 1
-    assert checked == 52
+    assert checked == 53
 
 
 def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
@@ -172,7 +174,7 @@ def test_routes_below_a_design_are_shown_with_one_that_has_what_they_need(
 
 
 def test_every_error_is_declared_with_its_shape(document: dict[str, Any]) -> None:
-    known = {str(status) for status, _, _ in (*STATUS.values(), *JOB_STATUS.values())}
+    known = {str(status) for status, _, _ in STATUS.values()}
     for path, method, operation in operations(document):
         responses = operation["responses"]
         errors = {status: r for status, r in responses.items() if status[0] in "45"}

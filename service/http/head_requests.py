@@ -22,4 +22,9 @@ class HeadRequests:
                 message = {**message, "body": b""}
             await send(message)
 
-        await self.app({**scope, "method": "GET"}, receive, without_body)
+        inner = {**scope, "method": "GET"}
+        try:
+            await self.app(inner, receive, without_body)
+        finally:
+            if "route" in inner:  # what the router found is told to those outside
+                scope["route"] = inner["route"]
