@@ -10,7 +10,7 @@ from anyio import CapacityLimiter, Semaphore, to_thread
 from fastapi import Depends, FastAPI
 from starlette.types import ASGIApp
 
-from service import errors, openapi, pages
+from service import errors, openapi, pages, workbench
 from service.access.door import Door
 from service.access.exposure import keys_required
 from service.access.guard import Guard
@@ -86,6 +86,7 @@ def create_app(settings: Settings | None = None) -> Application:
     for router in ROUTERS:
         app.include_router(router, dependencies=[Depends(acceptable)])
     pages.install(app)
+    workbench.install(app)
     errors.install(app)
     openapi.install(app, NAMES[0], example_id, example_job, keys_required(chosen))
     app.add_middleware(BodyLimit, limit=chosen.max_body_bytes)

@@ -1,11 +1,10 @@
-"""The server about itself: version, limits, and where to begin."""
+"""The server about itself: version and limits."""
 
 from __future__ import annotations
 
 import platform
 
 from fastapi import APIRouter, Request, Response
-from fastapi.responses import RedirectResponse
 
 from service.answering import answer, encode
 from service.limits import listed
@@ -15,12 +14,6 @@ from service.state import SettingsHere
 from service.version import code_version, release, solver
 
 router = APIRouter(tags=["server"])
-
-
-@router.get("/", include_in_schema=False)
-def beginning() -> RedirectResponse:
-    """The documentation is the front door."""
-    return RedirectResponse("docs")
 
 
 @router.get("/v1/version", response_model=Version, responses=problems())

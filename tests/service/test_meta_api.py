@@ -24,11 +24,6 @@ def test_health_version_limits(client: TestClient) -> None:
     assert limits["max_grid_points"] == 2500
 
 
-def test_the_front_door_leads_to_the_documentation(client: TestClient) -> None:
-    response = client.get("/", follow_redirects=False)
-    assert (response.status_code, response.headers["location"]) == (307, "docs")
-
-
 def test_examples(client: TestClient, refused: Any) -> None:
     everything = client.get("/v1/examples").json()
     assert tuple(everything) == NAMES

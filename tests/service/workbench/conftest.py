@@ -1,0 +1,128 @@
+"""A running server, Chromium, and pages that may neither fail nor ask anybody else."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+import uvicorn
+
+from service.app import create_app
+from service.settings import Settings
+
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+    "--enable-unsafe-swiftshader",
+]
+WAIT = 30_000
+
+
+@pytest.fixture(scope="session")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A real server on a free port of this machine."""
+    app = create_app(Settings(data_dir=tmp_path_factory.mktemp("workbench")))
+    server = uvicorn.Server(uvicorn.Config(app, host="127.0.0.1", port=0, log_level="warning"))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    deadline = time.monotonic() + 30
+    while not server.started:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    port = server.servers[0].sockets[0].getsockname()[1]
+    yield f"http://127.0.0.1:{port}"
+    server.should_exit = True
+    thread.join()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if chromium is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("there is no Chromium, and CI must see the workbench in one")
+        pytest.skip("there is no Chromium on this machine")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        yield opened
+        opened.close()
+
+
+@dataclass
+class Watch:
+    """What a page did that it must not; `refused` are statuses that a test brings about on purpose."""
+
+    failures: list[str] = field(default_factory=list)
+    outside: list[str] = field(default_factory=list)
+    refused: set[int] = field(default_factory=set)
+
+    def console(self, message: Any) -> None:
+        wanted = any(f"status of {status}" in message.text for status in self.refused)
+        if message.type in ("error", "warning") and not wanted:
+            self.failures.append(f"{message.text} {message.location}")
+
+
+@pytest.fixture
+def watch() -> Watch:
+    return Watch()
+
+
+@pytest.fixture
+def new_tab(address: str, browser: Any, watch: Watch) -> Iterator[Callable[..., Any]]:
+    """Make pages of a size and colour scheme; at the end none may have failed or asked another host."""
+    contexts = []
+
+    def only_us(route: Any) -> None:
+        if route.request.url.startswith((address, "data:", "blob:")):
+            route.continue_()
+        else:
+            watch.outside.append(route.request.url)
+            route.abort()
+
+    def make(width: int = 1280, height: int = 860, scheme: str = "light") -> Any:
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, color_scheme=scheme, accept_downloads=True
+        )
+        contexts.append(context)
+        context.route("**/*", only_us)
+        tab = context.new_page()
+        tab.set_default_timeout(WAIT)
+        tab.on("console", watch.console)
+        tab.on("pageerror", lambda error: watch.failures.append(str(error)))
+        return tab
+
+    yield make
+    for context in contexts:
+        context.close()
+    assert watch.failures == []
+    assert watch.outside == []
+
+
+@pytest.fixture
+def tab(new_tab: Callable[..., Any]) -> Any:
+    """One page at the size of a laptop."""
+    return new_tab()
+
+
+@pytest.fixture
+def open_example(address: str) -> Callable[..., None]:
+    """Open a shipped example from the front door and wait for its map."""
+
+    def opened(tab: Any, name: str = "wind_tunnel") -> None:
+        tab.goto(f"{address}/")
+        tab.get_by_role("button", name=f"Open {name}", exact=True).click()
+        tab.locator(".plot-canvas .main-svg").first.wait_for()
+
+    return opened
