@@ -1,22 +1,29 @@
 /** The envelope as a map: one figure of the design at every grid point; a click or the arrow keys choose a point. */
 
-import { fieldOf, figureOptions, needsVerdicts } from "./grid_figures.js";
+import { drawField } from "./field_map.js";
+import { fieldOf, figureOptions, sourceOf } from "./grid_figures.js";
+import { drawProof, proofTable } from "./proof_map.js";
+import { offer } from "./slow_study.js";
 
 const ARROWS = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [1, 0], ArrowDown: [-1, 0] };
+/** Cells that are proved at once; more are begun by a button. */
+const QUICK_CELLS = 40;
 
 export default { id: "map", title: "Map of the envelope", group: "envelope", needs: ["controller", "point"], mount };
 
 function mount(el, { api, state, plot, dom, format, grid, param, setParam, show }) {
   const { h } = dom;
   const choice = h("div", { class: "row" });
-  const picture = h("div", {});
-  const keys = h("div", { tabindex: "0", role: "application", "aria-label": "Map of the grid: arrow keys choose a point", onkeydown: step }, picture);
+  const place = h("div", {});
+  const keys = h("div", { tabindex: "0", role: "application", "aria-label": "Map of the grid: arrow keys choose a point", onkeydown: step }, place);
   const facts = h("div", { class: "stack" });
-  el.append(choice, h("div", { class: "map-with-facts" }, keys, facts));
+  const cells = h("div", {});
+  el.append(choice, h("div", { class: "map-with-facts" }, keys, facts), cells);
   let options = null;
-  let judged = null;
+  let picture = null;
+  const asked = new Map(); // path -> answer
   update(new Set(["controller"]));
-  return { update, unmount: () => plot.forget(picture) };
+  return { update, unmount: () => picture && plot.forget(picture) };
 
   function controller() {
     const { design, controller: name } = state.get();
@@ -26,55 +33,63 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
   function update(changed) {
     if (changed.has("controller")) {
       options = figureOptions(controller());
-      judged = null;
-      const select = dom.select("Colour by", options, figure(), (id) => setParam("figure", id));
-      dom.clear(choice).append(select);
+      dom.clear(choice).append(dom.select("Colour by", options, figure(), (id) => setParam("figure", id)));
     }
-    show(picture, judge, draw);
+    choice.firstChild.control.value = figure();
+    dom.clear(cells);
+    if (figure() === "proof") prove();
+    else show(fresh("field"), (signal) => askOnce(sourceOf(figure()), signal), draw);
     tell();
   }
 
-  /** Verdicts at every point are asked for with the first of them. */
-  async function judge(signal) {
-    const { designId, controller: name } = state.get();
-    if (needsVerdicts(figure())) judged ??= await api.get(`v1/designs/${designId}/controllers/${name}/verdicts`, { signal });
-    return judged;
-  }
-
   function figure() {
-    const asked = param("figure", options[0].value);
-    return options.some((option) => option.value === asked) ? asked : options[0].value;
+    const wanted = param("figure", options[0].value);
+    return options.some((option) => option.value === wanted) ? wanted : options[0].value;
   }
 
-  function draw() {
+  /** The place of the picture; fields and proofs have one each, whose axes differ. */
+  function fresh(kind) {
+    if (picture?.dataset.kind === kind) return picture;
+    if (picture) plot.forget(picture);
+    picture = h("div", { "data-kind": kind });
+    dom.clear(place).append(picture);
+    return picture;
+  }
+
+  /** Each answer is asked for once, with the first figure that needs it. */
+  async function askOnce(path, signal) {
+    if (path === null) return null;
+    const { designId, controller: name } = state.get();
+    const whole = path.startsWith("verification") ? `v1/designs/${designId}/${path}` : `v1/designs/${designId}/controllers/${encodeURIComponent(name)}/${path}`;
+    if (!asked.has(whole)) asked.set(whole, await api.get(whole, { signal }));
+    return asked.get(whole);
+  }
+
+  function draw(answer) {
     const { design, point } = state.get();
-    const field = fieldOf(controller(), figure(), judged);
-    const [rows, columns] = design.grid.axes;
-    const [i, j] = grid.placeOf(design, point);
-    const heat = {
-      type: "heatmap",
-      z: field.z,
-      x: columns.values.map((_, index) => index),
-      y: rows.values.map((_, index) => index),
-      text: field.text,
-      texttemplate: design.grid.shape[1] <= 12 ? "%{text}" : "",
-      hovertemplate: "%{text}<extra></extra>",
-      colorscale: field.scale ?? plot.FIELD,
-      ...field.range,
-      showscale: field.showScale,
-      colorbar: { title: { text: field.title, side: "right" }, thickness: 14 },
-      xgap: 1,
-      ygap: 1,
-      name: field.title,
-    };
-    const mark = { type: "rect", x0: j - 0.5, x1: j + 0.5, y0: i - 0.5, y1: i + 0.5, line: { width: 4, color: "#d55e00" } };
-    const label = `${field.title} of controller ${controller().name} over the grid; chosen is ${grid.pointName(design, point)}: ${field.text[i][j].replace("<br>", ", ")}`;
-    return plot.draw(picture, [heat], { xaxis: ticks(format, columns), yaxis: ticks(format, rows), shapes: [mark] }, { label, onPick: pick, height: Math.min(560, 170 + 60 * rows.values.length) });
+    return drawField(picture, design, point, fieldOf(controller(), figure(), answer), { of: `controller ${controller().name}`, onPoint: choose });
   }
 
-  function pick({ x, y }) {
-    const { design } = state.get();
-    state.set({ point: y * design.grid.shape[1] + x });
+  function prove() {
+    const { design, controller: name } = state.get();
+    const path = `verification?controller=${encodeURIComponent(name)}`;
+    const [rows, columns] = design.grid.shape;
+    const count = Math.max(rows - 1, 1) * Math.max(columns - 1, 1);
+    const begin = () => show(fresh("proof"), (signal) => askOnce(path, signal), drawCells);
+    if (count <= QUICK_CELLS || asked.has(`v1/designs/${state.get().designId}/${path}`)) begin();
+    else offer(fresh("proof"), { label: `Prove ${count} cells`, words: "Stability in every cell between the grid lines: some seconds." }, begin);
+  }
+
+  async function drawCells(answer) {
+    const { design, point } = state.get();
+    const proof = answer.controllers[controller().name];
+    await drawProof(picture, design, point, proof, { of: `controller ${controller().name}`, onPoint: choose });
+    const { columns, rows } = proofTable(design, proof);
+    dom.clear(cells).append(h("p", {}, `${proof.summary.words}.`, proof.reason ? ` ${proof.reason}.` : ""), h("div", { class: "scroll" }, dom.table("Verdicts of the cells", columns, rows)));
+  }
+
+  function choose(point) {
+    state.set({ point });
   }
 
   function step(event) {
@@ -86,8 +101,8 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
     const [rows, columns] = design.grid.shape;
     const row = Math.min(Math.max(i + move[0], 0), rows - 1);
     const column = Math.min(Math.max(j + move[1], 0), columns - 1);
-    state.set({ point: row * columns + column });
-    dom.live(`${grid.pointName(design, state.get().point)}`);
+    choose(row * columns + column);
+    dom.live(grid.pointName(design, state.get().point));
   }
 
   /** The chosen point in figures. */
@@ -107,14 +122,4 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
       list(gains),
     );
   }
-}
-
-function ticks(format, { name, values }) {
-  return {
-    title: { text: format.title(name) },
-    tickvals: values.map((_, index) => index),
-    ticktext: values.map((value) => format.number(value)),
-    showgrid: false,
-    zeroline: false,
-  };
 }

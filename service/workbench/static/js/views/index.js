@@ -4,7 +4,15 @@
  * It draws itself once when it is mounted; `update` follows a change of point, controller or parameters.
  */
 
+import eigenvalueSweeps from "./eigenvalue_sweeps.js";
+import gainSurfaces from "./gain_surfaces.js";
 import gridMap from "./grid_map.js";
+import phasePlane from "./phase_plane.js";
+import poleMap from "./pole_map.js";
+import robustPerformance from "./robust_performance.js";
+import steadyState from "./steady_state.js";
+import torqueSpeed from "./torque_speed.js";
+import weights from "./weights.js";
 
 /** @type {Object[]} */
-export const VIEWS = [gridMap];
+export const VIEWS = [gridMap, gainSurfaces, weights, poleMap, robustPerformance, torqueSpeed, eigenvalueSweeps, steadyState, phasePlane];

@@ -1,0 +1,128 @@
+/** Closed-loop poles of every grid point at once: coloured by the last axis, a symbol for each value of the first. */
+
+import { MARKER_SCALE } from "./envelope_axes.js";
+import { offer } from "./slow_study.js";
+
+const SYMBOLS = ["circle-open", "x-thin-open", "square-open", "diamond-open", "triangle-up-open", "cross-thin-open", "triangle-down-open", "star-open", "hexagon-open", "pentagon-open"];
+/** How many of each point's slowest poles are sure to be in the picture. */
+const RANGES = [{ value: "2", label: "the two slowest of each point" }, { value: "4", label: "the four slowest of each point" }, { value: "all", label: "all poles" }];
+const PLANTS = [{ value: "closed", label: "closed loop" }, { value: "both", label: "closed loop and plant" }];
+/** Points whose documents are asked for at once; more are begun by a button. */
+const QUICK_POINTS = 60;
+const AT_A_TIME = 4;
+
+export default { id: "poles", title: "Poles over the envelope", group: "envelope", needs: ["controller", "point"], mount };
+
+function mount(el, { api, state, plot, dom, format, grid, param, setParam, show }) {
+  const { h } = dom;
+  const choice = h("div", { class: "row" });
+  const picture = h("div", {});
+  el.append(choice, picture);
+  let documents = null; // of every point; they hold all controllers
+  choice.append(
+    dom.select("Range", RANGES, range(), (value) => setParam("range", value)),
+    dom.select("Poles of", PLANTS, plants(), (value) => setParam("of", value)),
+  );
+  const count = grid.pointCount(state.get().design);
+  if (count <= QUICK_POINTS) update();
+  else offer(picture, { label: `Compute the poles of ${count} points`, words: "One request a point: some 20 ms each." }, () => load());
+  return { update, unmount: () => plot.forget(picture) };
+
+  function range() {
+    const wanted = param("range", "4");
+    return RANGES.some(({ value }) => value === wanted) ? wanted : "4";
+  }
+
+  function plants() {
+    return param("of", "closed") === "both" ? "both" : "closed";
+  }
+
+  function update() {
+    if (documents || count <= QUICK_POINTS) load();
+  }
+
+  function load() {
+    show(picture, async (signal) => (documents ??= await all(signal)), draw);
+  }
+
+  /** Documents of all points, a few at a time. */
+  async function all(signal) {
+    const { designId } = state.get();
+    const found = new Array(count);
+    let next = 0;
+    const take = async () => {
+      while (next < count) {
+        const index = next;
+        next += 1;
+        found[index] = await api.get(`v1/designs/${designId}/points/${index}`, { signal });
+      }
+    };
+    await Promise.all(Array.from({ length: AT_A_TIME }, take));
+    return found;
+  }
+
+  function draw(points) {
+    const { design, controller, point } = state.get();
+    const own = points.map((one) => one.controllers.find(({ name }) => name === controller)?.poles ?? []);
+    if (own.every((poles) => !poles.length)) return dom.message(picture, "empty", `Controller ${controller} has no gains at any point, hence no poles.`);
+    const [rows, columns] = design.grid.axes;
+    const names = rows.values.map((value) => `${format.words(rows.name)} ${format.quantity(value, format.unitOf(rows.name))}`);
+    const traces = [...names.map((name, row) => ofRow(own, row, name)), ...names.map(ofLegend)];
+    if (plants() === "both") traces.push(ofPlant(points));
+    traces.push(ofChosen(own[point] ?? [], point));
+    const shown = plants() === "both" ? [...own, ...points.map((one) => one.poles ?? [])] : own;
+    const radius = range() === "all" ? null : slowRadius(shown, Number(range()));
+    const limits = radius ? { xaxis: axis("real part [1/s]", [-radius, 0.25 * radius]), yaxis: axis("imaginary part [rad/s]", [-radius, radius], "x") } : {};
+    const last = columns.values.length > 1 ? columns.values : [columns.values[0], columns.values[0] + 1];
+    const coloraxis = { colorscale: MARKER_SCALE, cmin: last[0], cmax: last.at(-1), colorbar: { title: { text: format.title(columns.name), side: "right" }, thickness: 14 } };
+    const worst = Math.max(...own.flat().map(({ re }) => re));
+    const label = `Poles of controller ${controller} at ${count} points, largest real part ${format.number(worst)} 1/s; chosen is ${grid.pointName(design, point)}`;
+    return plot.sPlane(picture, traces, { label, layout: { ...limits, coloraxis, uirevision: `${range()} ${plants()} ${controller}` }, onPick: ({ customdata }) => state.set({ point: customdata }) });
+  }
+
+  function ofRow(own, row, name) {
+    const { grid: { axes: [, columns] } } = state.get().design;
+    const width = columns.values.length;
+    const entries = own.slice(row * width, (row + 1) * width).flatMap((poles, column) => poles.map((pole) => ({ pole, column, point: row * width + column })));
+    return { ...trace(name, entries, { symbol: SYMBOLS[row % SYMBOLS.length], color: entries.map(({ column }) => columns.values[column]), coloraxis: "coloraxis", size: 10, line: { width: 2 } }), showlegend: false };
+  }
+
+  /** An entry of the legend: of a trace coloured by a scale Plotly has no single colour to draw there. */
+  function ofLegend(name, row) {
+    return { name, mode: "markers", x: [null], y: [null], hoverinfo: "skip", marker: { symbol: SYMBOLS[row % SYMBOLS.length], size: 10, color: "#76848f", line: { width: 2 } } };
+  }
+
+  function ofPlant(points) {
+    const entries = points.flatMap((one, point) => (one.poles ?? []).map((pole) => ({ pole, point })));
+    return trace("plant, no control", entries, { symbol: "asterisk-open", size: 8, color: "#76848f", line: { width: 1.2, color: "#76848f" } });
+  }
+
+  function ofChosen(poles, point) {
+    return trace("chosen point", poles.map((pole) => ({ pole, point })), { symbol: "circle-open", size: 18, color: "#d55e00", line: { width: 2, color: "#d55e00" } });
+  }
+
+  function trace(name, entries, marker) {
+    const { design } = state.get();
+    const damping = ({ re, im }) => format.number(-re / Math.hypot(re, im));
+    return {
+      name,
+      mode: "markers",
+      x: entries.map(({ pole }) => pole.re),
+      y: entries.map(({ pole }) => pole.im),
+      customdata: entries.map(({ point }) => point),
+      text: entries.map(({ pole, point }) => `${grid.pointName(design, point)}<br>${format.complex(pole)}, damping ratio ${damping(pole)}`),
+      hovertemplate: "%{text}<extra></extra>",
+      marker,
+    };
+  }
+
+  function axis(title, shown, anchor = null) {
+    return { title: { text: title }, range: shown, ...(anchor ? { scaleanchor: anchor, scaleratio: 1 } : { constraintoward: "right" }) };
+  }
+}
+
+/** Radius that holds the slowest poles of every point, with a margin. */
+function slowRadius(all, count) {
+  const last = (poles) => poles.map(({ re, im }) => Math.hypot(re, im)).sort((one, other) => one - other).slice(0, count).at(-1) ?? 0;
+  return 1.15 * Math.max(...all.map(last), 1e-9);
+}
