@@ -18,6 +18,10 @@ from importlib.util import find_spec  # noqa: E402
 from model.memory import keep_freed_memory  # noqa: E402
 from tests.benchmarks.measure import measure  # noqa: E402
 from tests.benchmarks.rows import rows  # noqa: E402
+from tests.benchmarks.slider_latency import GOAL, MOVES, latencies  # noqa: E402
+
+#: Name of the rows that have no peer: what moves in the workbench.
+SLIDERS = "slider"
 
 
 def main() -> None:
@@ -43,6 +47,24 @@ def main() -> None:
         print(
             f"{row.job:<44} {row.peer:<28} {1e3 * min(done.ours):>9.2f} {1e3 * min(done.theirs):>9.1f} "
             f"{done.ratio:>7.1f} {low:>7.1f}..{high:<6.1f} {row.goal:>6g} {verdict}",
+            flush=True,
+        )
+    if arguments.only in SLIDERS:
+        _sliders()
+
+
+def _sliders() -> None:
+    """Print one line a slider of the workbench: its median time against what a hand takes for at once."""
+    found = latencies()
+    if found is None:
+        print(f"{SLIDERS}: not measured, there is no Chromium on this machine")
+        return
+    for slider in found:
+        times = sorted(slider.seconds)
+        verdict = "met" if slider.median < GOAL else "MISSED"
+        print(
+            f"{slider.job:<44} {f'{SLIDERS}, {MOVES} moves':<28} {1e3 * slider.median:>9.2f} {1e3 * GOAL:>9.1f} "
+            f"{GOAL / slider.median:>7.1f} {GOAL / times[-1]:>7.1f}..{GOAL / times[0]:<6.1f} {1:>6g} {verdict}",
             flush=True,
         )
 
