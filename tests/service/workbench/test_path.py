@@ -39,7 +39,7 @@ def test_the_map_shows_what_the_design_says(tab: Any, open_example: Callable[...
     shown = [float(cell) for cell in tab.locator(".plot details td:last-child").all_inner_texts()]
     expected = [value for row in gains[0]["values"] for value in row]
     assert shown == pytest.approx(expected, rel=1e-3)
-    tab.locator(".plot-canvas").evaluate("el => el.emit('plotly_click', {points: [{x: 2, y: 1}]})")
+    tab.locator(".plot-canvas").evaluate("el => el.emit('plotly_click', {points: [{x: '980', y: '3000'}]})")
     assert "point=6" in tab.evaluate("location.hash")
     assert tab.get_by_label("Point", exact=True).input_value() == "6"
 
@@ -50,13 +50,13 @@ def test_an_address_brings_the_view_back(
     open_example(tab)
     tab.get_by_label("Controller", exact=True).select_option("pf")
     tab.get_by_label("Point", exact=True).select_option("5")
-    tab.get_by_label("Colour by").select_option("verdict.gain_margin_db_min")
+    tab.get_by_label("Colour by").select_option("verdict.spec_pack.gain_margin_db_min")
     other = new_tab()
     other.goto(tab.evaluate("location.href"))
     other.locator(".plot-canvas .main-svg").first.wait_for()
     assert other.get_by_label("Controller", exact=True).input_value() == "pf"
     assert other.get_by_label("Point", exact=True).input_value() == "5"
-    assert other.get_by_label("Colour by").input_value() == "verdict.gain_margin_db_min"
+    assert other.get_by_label("Colour by").input_value() == "verdict.spec_pack.gain_margin_db_min"
     label = other.locator(".plot-canvas").get_attribute("aria-label")
     assert "gain margin" in label
     assert "missed" in label

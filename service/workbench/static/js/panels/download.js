@@ -123,9 +123,9 @@ function missing(design, controller) {
 function optionsOf(root) {
   const parameters = root.paths[ROUTE].get.parameters.filter((one) => one.in === "query");
   return parameters.map(({ name, description, schema }) => {
-    const branch = schema.enum ? schema : (schema.anyOf ?? []).find((one) => one.enum);
+    const allowed = [schema, ...(schema.anyOf ?? [])].flatMap((one) => one.enum ?? (one.const === undefined ? [] : [one.const]));
     const first = { value: "", label: schema.default === undefined ? "none" : words(schema.default) };
-    const rest = branch.enum.filter((one) => one !== schema.default).map((one) => ({ value: one, label: words(one) }));
+    const rest = allowed.filter((one) => one !== schema.default).map((one) => ({ value: one, label: words(one) }));
     const label = words(name);
     return { name, description, label: label[0].toUpperCase() + label.slice(1), values: [first, ...rest] };
   });
