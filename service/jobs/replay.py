@@ -17,9 +17,10 @@ from service.access.door import Admitted, Door
 from service.access.principals import OPERATOR, Principal
 from service.app import Application, create_app
 from service.designs import Designs
+from service.jobs.given_designs import GivenDesigns
 from service.settings import Settings
 from service.state import State
-from service.store.designs import DesignStore, StoredDesign
+from service.store.designs import StoredDesign
 from service.store.store import Store
 
 
@@ -55,21 +56,11 @@ class _OpenDoor(Door):
         return None
 
 
-class _GivenDesigns(DesignStore):
-    """The designs that a task brought along."""
-
-    def __init__(self, designs: Mapping[str, StoredDesign]) -> None:
-        self._designs = designs
-
-    def get(self, ident: str, owner: str | None = None) -> StoredDesign | None:
-        return self._designs.get(ident)
-
-
 class _GivenStore(Store):
     """A store of these designs and nothing else: neither a database nor files."""
 
     def __init__(self, designs: Mapping[str, StoredDesign]) -> None:
-        self.designs = _GivenDesigns(designs)
+        self.designs = GivenDesigns(designs)
 
 
 def _settings(limits: str) -> Settings:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import zlib
-from base64 import b64decode, b64encode
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +11,7 @@ import orjson
 
 from service.errors import problem
 from service.jobs.frames import cut, joined
+from service.jobs.given_designs import design_document, read_design
 from service.jobs.kinds.kind import Document, Finished, TaskFailed
 from service.store.designs import StoredDesign
 from service.store.jobs import Job, NewJob
@@ -20,7 +20,6 @@ from service.store.store import Store
 ANSWER = "answer"
 #: Headers of an answer that are kept beside its bytes.
 _KEPT_HEADERS = ("content-type", "content-disposition", "x-content-type-options")
-_BYTES = ("request", "answer", "parts")
 
 
 def asked(method: str, path: str, query: str, body: Any) -> Document:
@@ -31,7 +30,7 @@ def asked(method: str, path: str, query: str, body: Any) -> Document:
 
 def answer_job(request: Document, ident: str, designs: Mapping[str, StoredDesign], limits: Mapping[str, int]) -> NewJob:
     """The job that answers a request (`asked`) under these limits, which may be wider than those in line."""
-    given = {name: _written(design) for name, design in designs.items()}
+    given = {name: design_document(design) for name, design in designs.items()}
     spec = orjson.dumps(request | {"designs": given, "limits": dict(limits)})
     return NewJob(ident, ANSWER, zlib.compress(spec), 1)
 
@@ -52,7 +51,7 @@ class AnswerJobs:
         # The routes lead to jobs and these to their kinds: what replays a request is known to workers only.
         from service.jobs.replay import replayed
 
-        designs = {name: _read(design) for name, design in task["designs"].items()}
+        designs = {name: read_design(design) for name, design in task["designs"].items()}
         status, headers, body = replayed(task, designs, task["limits"])
         if status >= 400:
             raise TaskFailed(_problem(body))
@@ -78,14 +77,3 @@ def _problem(body: bytes) -> Document:
     if isinstance(document, dict):
         return document
     return problem(500, "internal_error", "Internal error", "the answer to the request is no problem document")
-
-
-def _written(design: StoredDesign) -> Document:
-    words = {name: getattr(design, name) for name in ("id", "name", "created_at", "version")}
-    content = {name: getattr(design, name) for name in _BYTES}
-    return words | {name: None if value is None else b64encode(value).decode() for name, value in content.items()}
-
-
-def _read(document: Document) -> StoredDesign:
-    content = {name: None if document[name] is None else b64decode(document[name]) for name in _BYTES}
-    return StoredDesign(**(document | content))
