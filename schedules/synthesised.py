@@ -22,6 +22,7 @@ from design.lqr.synthesis import LqrDesign
 from design.lqr.weights import WeightName, WeightsRefused
 from design.outcome import Outcomes
 from design.response.demand import ActuatorDemand
+from design.response.manoeuvre_demand import ManoeuvreDemand
 from design.response.step_metrics import StepMetrics
 from design.sampling import Sampling
 from design.specs import Spec
@@ -85,8 +86,8 @@ class PartDesign(GridArrays):
 
 _KINDS = (
     Refused, PartDesign, Part, Outcomes, Gain, Loop, SisoLoop, CodedLoop, Sampling, Assessment, Margins, StepMetrics,
-    ActuatorDemand, LqrDesign, SampledLqrDesign, Retuning, PowerFigures, Structure, Actuator, ActuatorLimits,
-    KalmanFilter, Infeasibility, Relaxation, Spec,
+    ActuatorDemand, ManoeuvreDemand, LqrDesign, SampledLqrDesign, Retuning, PowerFigures, Structure, Actuator,
+    ActuatorLimits, KalmanFilter, Infeasibility, Relaxation, Spec,
 )  # fmt: skip
 
 

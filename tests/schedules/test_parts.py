@@ -63,6 +63,7 @@ STUDIES = {
     "sampled, with a delay": lambda s: _late(
         s, (replace(s.controllers[1], specs=(Spec("damping_ratio", "min", 0.3),), sampling=Sampling(0.004, 0.001)),)
     ),
+    "a reference of limited rate": lambda s: replace(s, reference=replace(s.reference, rate_limit=1.0)),
     "smooth": lambda s: replace(s, controllers=(replace(s.controllers[0], smoothness=0.1),)),
     "lqr with delays": lambda s: _late(s, (replace(s.controllers[2], delay_states=2),)),
     "lqr of estimates with delays": lambda s: _late(
