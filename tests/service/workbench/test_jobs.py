@@ -48,7 +48,8 @@ class Jobs:
         self.followed.append(ident)
         for event in self.events.get(ident, []):
             self.jobs[ident] = event
-        body = "".join(f"id: {n}\ndata: {json.dumps(one)}\n\n" for n, one in enumerate(self.events.get(ident, [])))
+        events = enumerate(self.events.get(ident, []))
+        body = "".join(f"event: {one['state']}\nid: {n}\ndata: {json.dumps(one)}\n\n" for n, one in events)
         route.fulfill(body=f"retry: 60000\n\n{body}", content_type="text/event-stream")
 
 

@@ -1,6 +1,12 @@
 /** The events of one job. */
 
+import { keyHeaders } from "../key.js";
 import { ended } from "./job_row.js";
+
+/** Events are named by the state that the job is in then. */
+const STATES = ["queued", "running", "cancelling", "cancelled", "failed", "succeeded"];
+/** Between two looks at a job where its events cannot be followed [ms]. */
+const PAUSE = 1000;
 
 /**
  * Follow a job until it has ended; the browser connects again by itself where the stream breaks.
@@ -10,14 +16,37 @@ import { ended } from "./job_row.js";
  * @returns {{id: string, end: function(): void}}
  */
 export function followJob(api, id, changed) {
-  const stream = new EventSource(api.url(`v1/jobs/${encodeURIComponent(id)}/events`));
+  const path = `v1/jobs/${encodeURIComponent(id)}`;
+  // The browser's own reader of events sends no headers, and so no key.
+  return { id, end: keyHeaders().Authorization ? lookAgain(api, path, changed) : listen(api.url(`${path}/events`), changed) };
+}
+
+function listen(address, changed) {
+  const stream = new EventSource(address);
   const end = () => stream.close();
   const take = ({ data }) => {
     const job = JSON.parse(data);
     if (ended(job)) end();
     changed(job);
   };
-  stream.addEventListener("message", take);
-  stream.addEventListener("job", take);
-  return { id, end };
+  for (const name of STATES) stream.addEventListener(name, take);
+  return end;
+}
+
+function lookAgain(api, path, changed) {
+  const gone = new AbortController();
+  const look = async () => {
+    try {
+      const job = await api.get(path, { signal: gone.signal });
+      changed(job);
+      if (!ended(job)) timer = window.setTimeout(look, PAUSE);
+    } catch (problem) {
+      if (problem.name !== "AbortError") timer = window.setTimeout(look, PAUSE);
+    }
+  };
+  let timer = window.setTimeout(look, PAUSE);
+  return () => {
+    gone.abort();
+    window.clearTimeout(timer);
+  };
 }
