@@ -12,7 +12,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: serve test lint bench format clean
+.PHONY: serve test lint bench examples screenshots format clean
 
 serve: .venv/ready
 	$(BIN)/python -m service --host $(HOST) --port $(PORT)
@@ -28,6 +28,12 @@ lint: .venv/ready-dev
 
 bench: .venv/ready-dev
 	$(BIN)/python -m tests.benchmarks
+
+examples: .venv/ready-dev
+	$(BIN)/python -m tests.make_answer_examples
+
+screenshots: .venv/ready-dev
+	$(BIN)/python -m tests.screenshots build/screenshots
 
 format: .venv/ready-dev
 	$(BIN)/ruff check --fix

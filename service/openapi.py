@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from http import HTTPStatus
 from typing import Any
 
@@ -10,12 +11,17 @@ from fastapi import FastAPI
 from pydantic.json_schema import models_json_schema
 
 from service.access.door import OPEN
+from service.answer_examples import example_answer
 from service.body_examples import BODIES
+from service.curl_lines import curl_line
+from service.design_examples import design_requests
 from service.errors import MEDIA_TYPE, STATUS, problem
 from service.http.repeats import HEADER, LONGEST_KEY
+from service.operation_titles import GROUPS, TITLES
 from service.refusals import FieldRefusal
 from service.schemas.jobs import Job
 from service.schemas.problem import FieldProblem, Problem
+from service.symbols import describe_symbols
 from service.units import state_units
 
 #: What a route that reads a body may refuse it for.
@@ -45,6 +51,9 @@ and actuator requirements, download the gain schedule.
 Angles are in degrees and every dimensional field ends in its unit; gains are in SI and radians and carry theirs.
 Deflections are positive trailing edge up, the tab's angle is relative to the aileron, and `u = -K x`.
 Errors are problem documents (RFC 9457) that name the field, its unit and what is allowed there.
+
+The lines for a shell run as they stand once `GAINFIELD` holds this server's address, and the shipped example is posted:
+the first line of *Designs* does that. Answers are shown with their lists cut short.
 """
 
 
@@ -86,6 +95,7 @@ def install(
     Routes below a design are shown with the first example, or the one that `shown_with` says.
     """
     plain = app.openapi
+    marks = {"job": example_job} | {f"design {name}": partial(example_id, name) for name in design_requests()}
 
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is None:
@@ -106,6 +116,10 @@ def install(
                     of_jobs = path.startswith("/v1/jobs")
                     shown = example_job() if of_jobs else example_id(operation.pop(_EXAMPLE, first_example))
                     _complete(path, method, operation, shown)
+                    _present(path, method, operation, keys, marks)
+            document["tags"] = [{"name": name, "description": words} for name, words in GROUPS.items()]
+            for schema in schemas.values():
+                describe_symbols(schema)
             if keys:
                 document["components"]["securitySchemes"] = _SCHEMES
         return app.openapi_schema or {}
@@ -158,3 +172,19 @@ def _complete(path: str, method: str, operation: dict[str, Any], example_id: str
         del operation["responses"]["422"]
     if "requestBody" in operation:
         operation["requestBody"]["content"]["application/json"]["examples"] = BODIES[path]()
+
+
+def _present(
+    path: str, method: str, operation: dict[str, Any], keys: bool, marks: dict[str, Callable[[], str]]
+) -> None:
+    """Group and title of the operation, the answer to its example, and the line that asks for it."""
+    if (method, path) in TITLES:
+        group, operation["summary"] = TITLES[method, path]
+        operation["tags"] = [group]
+    shown = example_answer(method, path, marks)
+    for status in ("200", "201"):
+        content = operation["responses"].get(status, {}).get("content", {}).get("application/json")
+        if content is not None and shown is not None:
+            content["example"] = shown
+    line = curl_line(method, path, operation, keys and path not in OPEN)
+    operation["x-codeSamples"] = [{"lang": "Shell", "label": "curl", "source": line}]

@@ -15,6 +15,7 @@ import uvicorn
 
 from service.app import create_app
 from service.settings import Settings
+from tests.service.workbench.envelope_pages import Page
 
 FLAGS = [
     "--no-sandbox",
@@ -24,6 +25,7 @@ FLAGS = [
     "--disable-sync",
     "--no-first-run",
     "--enable-unsafe-swiftshader",
+    "--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1",  # nobody else is found
 ]
 WAIT = 30_000
 
@@ -84,19 +86,16 @@ def new_tab(address: str, browser: Any, watch: Watch) -> Iterator[Callable[..., 
     """Make pages of a size and colour scheme; at the end none may have failed or asked another host."""
     contexts = []
 
-    def only_us(route: Any) -> None:
-        if route.request.url.startswith((address, "data:", "blob:")):
-            route.continue_()
-        else:
-            watch.outside.append(route.request.url)
-            route.abort()
+    def seen(request: Any) -> None:
+        if not request.url.startswith((address, "data:", "blob:")):
+            watch.outside.append(request.url)
 
     def make(width: int = 1280, height: int = 860, scheme: str = "light") -> Any:
         context = browser.new_context(
             viewport={"width": width, "height": height}, color_scheme=scheme, accept_downloads=True
         )
         contexts.append(context)
-        context.route("**/*", only_us)
+        context.on("request", seen)
         tab = context.new_page()
         tab.set_default_timeout(WAIT)
         tab.on("console", watch.console)
@@ -126,3 +125,9 @@ def open_example(address: str) -> Callable[..., None]:
         tab.locator(".plot-canvas .main-svg").first.wait_for()
 
     return opened
+
+
+@pytest.fixture
+def page(tab: Any, address: str) -> Page:
+    """The same page, with what the tests of views over the envelope do there."""
+    return Page(tab, address)

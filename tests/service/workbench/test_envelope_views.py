@@ -2,74 +2,17 @@
 
 from __future__ import annotations
 
-import copy
-import time
 from collections.abc import Callable
 from typing import Any
-from urllib.parse import quote
 
 import pytest
+
+from tests.service.workbench.envelope_pages import Page
 
 pytestmark = pytest.mark.browser
 
 View = Callable[..., Any]
-PLOTTED = """el => el.data.map(({name, x, y, z, customdata}) => ({name, x, y, z, customdata}))"""
 DRIVER = ("GL Driver Message", "willReadFrequently")
-
-
-class Page:
-    """A tab, and the service it looks at."""
-
-    def __init__(self, tab: Any, address: str) -> None:
-        self.tab, self.address = tab, address
-
-    def get(self, path: str) -> Any:
-        answer = self.tab.request.get(f"{self.address}/v1/{path}")
-        assert answer.ok, answer.text()
-        return answer.json()
-
-    def post(self, path: str, body: Any) -> Any:
-        answer = self.tab.request.post(f"{self.address}/v1/{path}", data=body)
-        assert answer.ok, answer.text()
-        return answer.json()
-
-    def example(self, name: str = "wind_tunnel") -> Any:
-        return copy.deepcopy(self.get("examples")[name])
-
-    def design(self, name: str = "wind_tunnel") -> Any:
-        return self.post("designs", self.example(name))
-
-    def open(self, view: str, design: Any, **query: object) -> None:
-        """Show a view and wait until nothing is under way."""
-        text = "".join(f"&{name}={quote(str(value), safe='')}" for name, value in query.items())
-        self.tab.goto(f"{self.address}/#/explore/{view}?design={design['id']}{text}")
-        self.tab.locator(".view h3").wait_for()
-        self.settled()
-
-    def settled(self) -> None:
-        self.tab.locator(".plot-canvas .main-svg, .view .message:not(.loading), .view .primary").first.wait_for()
-        self.tab.locator("[aria-busy], .message.loading").first.wait_for(state="detached")
-
-    def plotted(self, place: int = 0) -> Any:
-        return self.tab.locator(".plot-canvas").nth(place).evaluate(PLOTTED)
-
-    def eventually(self, found: Callable[[], object], wanted: object) -> None:
-        deadline = time.monotonic() + 10
-        while found() != wanted:
-            assert time.monotonic() < deadline, f"{found()} is not {wanted}"
-            time.sleep(0.05)
-
-    def pick(self, point: str) -> None:
-        """A click, as Plotly tells it."""
-        self.tab.locator(".plot-canvas").first.evaluate(f"el => el.emit('plotly_click', {{points: [{point}]}})")
-
-    def point(self) -> str:
-        return str(self.tab.evaluate("new URLSearchParams(location.hash.split('?')[1]).get('point')"))
-
-
-@pytest.fixture
-def page(tab: Any, address: str) -> Page:
-    return Page(tab, address)
 
 
 def flat(rows: Any) -> list[float]:
@@ -77,7 +20,8 @@ def flat(rows: Any) -> list[float]:
 
 
 @pytest.mark.parametrize("example", ["wind_tunnel", "airliner_aileron"])
-def test_every_view_draws_and_says_what_it_shows(page: Page, example: str) -> None:
+def test_every_view_draws_and_says_what_it_shows(page: Page, watch: Any, example: str) -> None:
+    watch.refused.add(422)  # a simulation above the work in line, where no job may do more
     page.open("map", page.design(example), controller="lqr", point=3)
     views = page.tab.locator(".view-list a")
     titles = views.all_inner_texts()
@@ -85,9 +29,10 @@ def test_every_view_draws_and_says_what_it_shows(page: Page, example: str) -> No
     for title in titles:
         views.get_by_text(title, exact=True).click()
         assert page.tab.locator(".view > h3").inner_text() == title
-        page.tab.locator(".plot-canvas .main-svg").first.wait_for()
         page.settled()
         assert page.tab.locator(".view .message.refused").count() == 0, title
+        drawn = page.tab.locator(".plot-canvas .main-svg").count()
+        assert drawn >= 1 or title == "Verdicts", title
         for canvas in page.tab.locator(".plot-canvas").all():
             assert canvas.get_attribute("role") == "img"
             assert len(canvas.get_attribute("aria-label") or "") > 30

@@ -2,6 +2,8 @@
  * Requests to the service. Addresses are relative to the page, so that the workbench works below any path of a proxy.
  */
 
+import { askForKey, keyHeaders } from "./key.js";
+
 /**
  * A refused request: the problem document (RFC 9457) that the service answered, or what else went wrong.
  * @property {number} status HTTP status; 0 when no answer came
@@ -37,19 +39,22 @@ export function url(path, query = {}) {
   return address.href;
 }
 
+/** How often a job is asked whether it has ended [ms]. */
+const JOB_PACE = 300;
+
 /**
- * GET a JSON document.
+ * GET a JSON document; where a job does the work, its result once it has ended.
  * @param {string} path
  * @param {{signal?: AbortSignal, query?: Object<string, *>}} [options]
  * @returns {Promise<*>}
  * @throws {ApiProblem}
  */
 export async function get(path, { signal, query } = {}) {
-  return (await ask(url(path, query), { signal })).json();
+  return finished(await ask(url(path, query), { signal }), signal);
 }
 
 /**
- * POST a JSON document and read the JSON answer.
+ * POST a JSON document and read the JSON answer; where a job does the work, its result once it has ended.
  * @param {string} path
  * @param {*} body
  * @param {{signal?: AbortSignal, query?: Object<string, *>, headers?: Object<string, string>}} [options]
@@ -57,7 +62,7 @@ export async function get(path, { signal, query } = {}) {
  * @throws {ApiProblem}
  */
 export async function post(path, body, options = {}) {
-  return (await postRaw(path, JSON.stringify(body), options)).json();
+  return finished(await postRaw(path, JSON.stringify(body), options), options.signal);
 }
 
 /**
@@ -96,19 +101,44 @@ export async function remove(path, { signal } = {}) {
  * @throws {ApiProblem}
  */
 export async function file(path, { signal, query } = {}) {
-  return ask(url(path, query), { signal });
+  return settled(await ask(url(path, query), { signal }), signal);
+}
+
+/** The document of an answer. A job that nobody waits for any more is cancelled. */
+async function finished(response, signal) {
+  return (await settled(response, signal)).json();
+}
+
+/** The answer itself, be it given at once or by a job. */
+async function settled(response, signal) {
+  if (response.status !== 202) return response;
+  let job = await response.json();
+  const { links } = job;
+  try {
+    while (["queued", "running", "cancelling"].includes(job.state)) {
+      await new Promise((resolve) => window.setTimeout(resolve, JOB_PACE));
+      job = await (await ask(url(links.self), { signal })).json();
+    }
+  } catch (error) {
+    if (error.name === "AbortError") remove(links.self).catch(() => {}); // it may have ended meanwhile
+    throw error;
+  }
+  if (job.state === "succeeded") return ask(url(links.result), { signal });
+  throw new ApiProblem(job.error?.status ?? 0, job.error ?? { code: job.state, detail: `the job was ${job.state}` });
 }
 
 async function ask(address, options) {
   let response;
   try {
-    response = await fetch(address, { credentials: "same-origin", ...options });
+    response = await fetch(address, { credentials: "same-origin", ...options, headers: { ...options.headers, ...keyHeaders() } });
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new ApiProblem(0, { code: "no_answer", detail: "the service did not answer; is it running?" });
   }
   if (response.ok) return response;
-  throw new ApiProblem(response.status, await problem(response));
+  const refused = new ApiProblem(response.status, await problem(response));
+  if (response.status === 401 && (await askForKey(refused.detail))) return ask(address, options);
+  throw refused;
 }
 
 async function problem(response) {

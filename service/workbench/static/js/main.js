@@ -28,7 +28,7 @@ drawNavigation();
 state.subscribe(["designId"], loadDesign);
 state.subscribe(["panel"], showPanel);
 state.subscribe(["panel", "designId"], markNavigation);
-follow(state, { panels: PANELS.map((panel) => panel.id), views: VIEWS.map((view) => view.id) });
+follow(state, { panels: PANELS.map((panel) => panel.id), views: VIEWS.map((view) => view.id) }, placed);
 if (!mounted) showPanel();
 if (!state.get().designId) markNavigation();
 
@@ -75,18 +75,17 @@ async function loadDesign() {
   return undefined;
 }
 
-/** Take a design in: point and controller of the address stay where the design has them. */
+/** Take a design in. */
 function settle(design) {
-  const { point, controller } = state.get();
+  state.set({ design, designProblem: null, ...placed(design, state.get()) });
+  markNavigation();
+}
+
+/** Point and controller that are asked for, where the design has them; else its first. */
+function placed(design, { point, controller }) {
   const points = design.grid.shape.reduce((product, count) => product * count, 1);
   const names = design.controllers.map((one) => one.name);
-  state.set({
-    design,
-    designProblem: null,
-    point: point < points ? point : 0,
-    controller: names.includes(controller) ? controller : names[0],
-  });
-  markNavigation();
+  return { point: point < points ? point : 0, controller: names.includes(controller) ? controller : names[0] };
 }
 
 window.addEventListener("unhandledrejection", ({ reason }) => live(reason?.message ?? String(reason)));

@@ -3,6 +3,8 @@
  */
 
 const SHARED = ["design", "point", "controller"];
+/** Panels that show a grid point. */
+const POINTED = ["explore", "compare"];
 
 /**
  * The part of the address behind `#` that shows this state.
@@ -12,7 +14,7 @@ const SHARED = ["design", "point", "controller"];
 export function addressOf(state) {
   const query = new URLSearchParams();
   if (state.designId) query.set("design", state.designId);
-  if (state.designId && state.panel === "explore") query.set("point", String(state.point));
+  if (state.designId && POINTED.includes(state.panel)) query.set("point", String(state.point));
   if (state.designId && state.controller) query.set("controller", state.controller);
   for (const [name, value] of Object.entries(state.params)) {
     if (value !== null && value !== undefined && !SHARED.includes(name)) query.set(name, String(value));
@@ -48,9 +50,14 @@ export function stateOf(hash, { panels, views }) {
  * Keep the address and the state together; back and forward work.
  * @param {ReturnType<import("./state.js").createState>} state
  * @param {{panels: string[], views: string[]}} known
+ * @param {function(Object, Object): Object} placed point and controller of what an address asks for, in a design that is loaded
  */
-export function follow(state, known) {
-  const read = () => state.set(stateOf(window.location.hash, known));
+export function follow(state, known, placed) {
+  const read = () => {
+    const wanted = stateOf(window.location.hash, known);
+    const { design } = state.get();
+    state.set(design?.id === wanted.designId ? { ...wanted, ...placed(design, wanted) } : wanted);
+  };
   const write = () => {
     const now = state.get();
     const address = addressOf(now);

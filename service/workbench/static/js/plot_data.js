@@ -37,10 +37,15 @@ export function numbersOf(traces, layout) {
   const fields = traces.some((trace) => trace.z);
   const rows = traces.flatMap((trace, index) => {
     const name = trace.name ?? `${index + 1}`;
-    if (trace.z) return trace.z.flatMap((row, i) => [...row].map((z, j) => [name, trace.x?.[j] ?? j, trace.y?.[i] ?? i, trace.text?.[i]?.[j] ?? z]));
+    if (trace.z) return trace.z.flatMap((row, i) => [...row].map((z, j) => [name, trace.x?.[j] ?? j, trace.y?.[i] ?? i, plain(trace.text?.[i]?.[j]) ?? z]));
     return [...(trace.y ?? trace.x ?? [])].map((y, i) => [name, trace.x?.[i] ?? i, y].concat(fields ? [null] : []));
   });
   return { columns: fields ? [...columns, "value"] : columns, rows };
+}
+
+/** Text of a plot on one line. */
+function plain(text) {
+  return typeof text === "string" ? text.replaceAll("<br>", " ") : text;
 }
 
 /**

@@ -127,14 +127,13 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
 
   function drawGrowth(modes, { values }, heading) {
     const traces = [
-      { name: "largest real part [1/s]", x: values, y: modes.growth_1_s },
-      ...modes.omega_n_rad_s.map((y, index) => ({ name: `natural frequency of branch ${index + 1} [rad/s]`, x: values, y, yaxis: "y2" })),
+      { name: "largest real part [1/s]", x: values, y: modes.growth_1_s, showlegend: false },
+      ...modes.omega_n_rad_s.map((y, index) => ({ name: `natural frequency of branch ${index + 1} [rad/s]`, x: values, y, yaxis: "y2", showlegend: modes.omega_n_rad_s.length <= 4 })),
     ];
     const layout = {
       xaxis: { title: { text: heading }, anchor: "y" },
       yaxis: { title: { text: "largest real part [1/s]" }, domain: [0, 0.46], zeroline: true },
       yaxis2: { title: { text: "natural frequency [rad/s]" }, domain: [0.54, 1], rangemode: "tozero" },
-      showlegend: false,
       uirevision: quantity().value,
     };
     return plot.draw(growth, traces, layout, { label: `Largest real part and natural frequencies over ${heading}`, height: 520 });

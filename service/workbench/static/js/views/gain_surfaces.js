@@ -142,7 +142,7 @@ function mount(el, context) {
       const trace = { ...numbers, type: "contour", colorscale: plot.FIELD, contours: { showlabels: true }, connectgaps: false, colorbar: { title: { text: heading, side: "right" }, thickness: 14 } };
       return plot.draw(place, [trace], { xaxis: valueAxis(columns), yaxis: valueAxis(rows) }, { label, ...size });
     }
-    const layout = { xaxis: valueAxis(columns), yaxis: { title: { text: heading } }, showlegend: alone };
+    const layout = { xaxis: valueAxis(columns), yaxis: { title: { text: heading } }, showlegend: alone || rows.values.length <= 3 };
     return plot.draw(place, [...linesOf(grid, values), ...reading(name, columns)], layout, { label: `${label}; a line for each of ${categoriesOf(rows).join(", ")} (${format.title(rows.name)})`, ...size });
   }
 

@@ -3,7 +3,9 @@
 import { number, title, words } from "../format.js";
 
 const CATEGORY_SCALE = [[0, "#0072b2"], [0.5, "#0072b2"], [0.5, "#e69f00"], [1, "#e69f00"]];
-const CLOSED_LOOP = { decay_rate_1_s: "Decay rate [1/s]", damping_ratio: "Damping ratio", settling_time_s: "Settling time [s]", overshoot_percent: "Overshoot [%]" };
+const CLOSED_LOOP = ["decay_rate_1_s", "damping_ratio"];
+const STEP = ["rise_time_s", "settling_time_s", "overshoot_percent", "undershoot_percent", "peak_time_s", "steady_state_error_deg", "bandwidth_rad_s"];
+const MARGINS = ["gain_margin_up_db", "gain_margin_down_db", "phase_margin_deg", "delay_margin_s", "disk_margin", "sensitivity_peak", "crossover_rad_s"];
 const ACTUATOR = [
   "peak_torque_n_m", "rms_torque_n_m", "holding_torque_n_m", "peak_rate_deg_s", "peak_deflection_deg", "peak_acceleration_deg_s2",
   "peak_power_w", "rms_power_w", "energy_out_j", "energy_back_j",
@@ -13,7 +15,9 @@ const ACTUATOR = [
 const SOURCES = {
   value: "verdicts",
   verdict: "verdicts",
-  loop: "robust-performance?hinge_moment_percent=0&inertia_percent=0&C_Ha_da_percent=1", // its nominal figures; the one change is the least it takes
+  loop: "figures",
+  step: "figures",
+  margin: "figures",
   actuator: "actuator-requirements",
 };
 
@@ -27,8 +31,10 @@ export function figureOptions(controller) {
   const actuators = controller.kind === "lqr" ? ["tab", "aileron"] : ["tab"];
   return [
     ...controller.gains.map(({ name, unit }) => ({ value: `gain.${name}`, label: unit === "1" ? name : `${name} [${unit}]`, group: "Gain" })),
-    ...Object.entries(CLOSED_LOOP).map(([name, label]) => ({ value: `loop.${name}`, label, group: "Closed loop" })),
+    ...CLOSED_LOOP.map((name) => ({ value: `loop.${name}`, label: capital(title(name)), group: "Closed loop" })),
     { value: "reduced_frequency", label: "Reduced frequency of the fastest mode", group: "Closed loop" },
+    ...STEP.map((name) => ({ value: `step.${name}`, label: capital(title(name)), group: "Step response" })),
+    ...actuators.flatMap((loop) => MARGINS.map((name) => ({ value: `margin.${loop}.${name}`, label: `${capital(title(name))}, ${loop}`, group: `Margins, loop cut at the ${loop}` }))),
     ...judged.map((spec) => ({ value: `value.${spec}`, label: bare(spec), group: "Margins and peaks that are judged" })),
     ...actuators.flatMap((name) => ACTUATOR.map((figure) => ({ value: `actuator.${name}.${figure}`, label: `${title(figure)}, ${name}`, group: `Actuator: ${name}` }))),
     { value: "outcome", label: "Outcome", group: "Outcome and proof" },
@@ -51,7 +57,7 @@ export function sourceOf(id) {
  * @param {Object} controller of a design
  * @param {string} id of `figureOptions`, but `proof`
  * @param {?Object} answer that of the path that `sourceOf` names
- * @returns {{title: string, z: (?number)[][], text?: string[][], scale?: *, range?: Object, showScale: boolean, reasons?: (?string)[][]}}
+ * @returns {{title: string, z: (?number)[][], text?: string[][], scale?: *, range?: Object, showScale: boolean, note?: string}}
  */
 export function fieldOf(controller, id, answer) {
   const [kind, name] = id.split(/\.(.*)/);
@@ -60,7 +66,9 @@ export function fieldOf(controller, id, answer) {
     return numbers(gain.unit === "1" ? name : `${name} [${gain.unit}]`, gain.values);
   }
   if (kind === "reduced_frequency") return numbers("reduced frequency", controller.reduced_frequency);
-  if (kind === "loop") return ofTheLoop(name, answer.figures);
+  if (kind === "loop") return figure(name, answer[name], answer);
+  if (kind === "step") return figure(name, answer.step?.[name] ?? none(controller), answer);
+  if (kind === "margin") return ofALoop(name, answer, controller);
   if (kind === "value") return numbers(bare(name), answer.verdicts.find(({ spec }) => spec === name).values);
   if (kind === "actuator") return ofAnActuator(name, answer.actuators);
   if (kind === "verdict") return verdict(answer.verdicts.find(({ spec, source }) => name === `${source}.${spec}`));
@@ -71,9 +79,20 @@ function numbers(heading, z) {
   return { title: heading, z, showScale: true };
 }
 
-function ofTheLoop(name, figures) {
-  if (name !== "decay_rate_1_s") return numbers(CLOSED_LOOP[name].toLowerCase(), figures[name].nominal);
-  return numbers("decay rate [1/s]", figures.largest_real_part.nominal.map((row) => row.map((value) => (value === null ? null : -value))));
+function ofALoop(id, answer, controller) {
+  const [loop, name] = id.split(".");
+  return { ...figure(name, answer.margins[loop]?.[name] ?? none(controller), answer), title: `${title(name)}, ${loop}` };
+}
+
+/** A figure, and what it means where the controller has gains and the figure has no number. */
+function figure(name, z, { outcomes, null_means: meanings }) {
+  const missing = z.some((row, i) => row.some((value, j) => value === null && outcomes[i][j] === "ok"));
+  return { ...numbers(title(name), z), note: missing && meanings[name] ? `Where there is no number: ${meanings[name]}.` : "" };
+}
+
+/** A field without a number, of a controller that has gains nowhere. */
+function none({ outcomes }) {
+  return outcomes.map((row) => row.map(() => null));
 }
 
 function ofAnActuator(name, actuators) {
@@ -96,6 +115,10 @@ function categories(heading, cells) {
     range: { zmin: 0, zmax: 1 },
     showScale: false,
   };
+}
+
+function capital(text) {
+  return text[0].toUpperCase() + text.slice(1);
 }
 
 /** What a spec judges, without the sense of its limit. */

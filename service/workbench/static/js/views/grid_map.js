@@ -15,10 +15,11 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
   const { h } = dom;
   const choice = h("div", { class: "row" });
   const place = h("div", {});
+  const note = h("p", { class: "small muted" });
   const keys = h("div", { tabindex: "0", role: "application", "aria-label": "Map of the grid: arrow keys choose a point", onkeydown: step }, place);
   const facts = h("div", { class: "stack" });
   const cells = h("div", {});
-  el.append(choice, h("div", { class: "map-with-facts" }, keys, facts), cells);
+  el.append(choice, h("div", { class: "map-with-facts" }, h("div", { class: "stack" }, keys, note), facts), cells);
   let options = null;
   let picture = null;
   const asked = new Map(); // path -> answer
@@ -37,6 +38,7 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
     }
     choice.firstChild.control.value = figure();
     dom.clear(cells);
+    note.textContent = "";
     if (figure() === "proof") prove();
     else show(fresh("field"), (signal) => askOnce(sourceOf(figure()), signal), draw);
     tell();
@@ -67,7 +69,9 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
 
   function draw(answer) {
     const { design, point } = state.get();
-    return drawField(picture, design, point, fieldOf(controller(), figure(), answer), { of: `controller ${controller().name}`, onPoint: choose });
+    const field = fieldOf(controller(), figure(), answer);
+    note.textContent = field.note ?? "";
+    return drawField(picture, design, point, field, { of: `controller ${controller().name}`, onPoint: choose });
   }
 
   function prove() {

@@ -18,10 +18,11 @@ import robustPerformance from "./robust_performance.js";
 import rootLocus from "./root_locus.js";
 import steadyState from "./steady_state.js";
 import torqueSpeed from "./torque_speed.js";
+import verdicts from "./verdicts.js";
 import weights from "./weights.js";
 
 /** @type {Object[]} */
 export const VIEWS = [
-  gridMap, gainSurfaces, weights, poleMap, robustPerformance, torqueSpeed, eigenvalueSweeps, steadyState, phasePlane,
+  gridMap, verdicts, gainSurfaces, weights, poleMap, robustPerformance, torqueSpeed, eigenvalueSweeps, steadyState, phasePlane,
   rootLocus, pointWeights, bode, nichols, response, plant,
 ];

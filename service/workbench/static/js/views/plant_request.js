@@ -18,6 +18,15 @@ export function plantAt(design, point) {
 }
 
 /**
+ * The plant of a design over its whole grid.
+ * @param {Object} design
+ * @returns {Object} `geometry inertia aerodynamics atmosphere trim grid`
+ */
+export function plantOf(design) {
+  return Object.fromEntries([...PARTS, "grid"].map((part) => [part, design.request[part]]));
+}
+
+/**
  * Every number of the plant but its tables, by JSON pointer.
  * @param {Object} design
  * @returns {{pointer: string, value: number}[]}

@@ -2,6 +2,7 @@
 
 import { h, table } from "../dom.js";
 import { complex, number, quantity, unitOf, words } from "../format.js";
+import { asked, askedBy, judged } from "../spec_words.js";
 
 const MARGINS = ["gain_margin_up_db", "gain_margin_down_db", "phase_margin_deg", "delay_margin_s", "disk_margin", "sensitivity_peak", "crossover_rad_s"];
 const ROUNDING = 1e-9; // what stays of a figure that is nought
@@ -39,7 +40,7 @@ export function reasonList(controller) {
  */
 export function verdictLine({ verdicts }) {
   const missed = verdicts.filter(({ passed }) => !passed);
-  const said = missed.map(({ spec, value, limit, unit }) => `${words(spec).replace(/_?(min|max)$/, "").trim()} ${quantity(value, unit)} (limit ${quantity(limit, unit)})`);
+  const said = missed.map(({ spec, value, limit, unit }) => `${judged(spec)} ${quantity(value, unit)} (limit ${quantity(limit, unit)})`);
   const tag = missed.length ? h("span", { class: "tag bad" }, `${missed.length} of ${verdicts.length} missed`) : h("span", { class: "tag good" }, `all ${verdicts.length} met`);
   return h("p", { class: "small" }, tag, missed.length ? ` ${[...new Set(said)].join("; ")}` : "");
 }
@@ -51,12 +52,12 @@ export function verdictLine({ verdicts }) {
  */
 export function verdictTable({ name, verdicts }) {
   const rows = verdicts.map(({ spec, limit, unit, source, value, distance, passed }) => [
-    words(spec).replace(/ (min|max)$/, ""),
-    `${spec.endsWith("_min") ? "at least" : "at most"} ${quantity(limit, unit)}`,
+    judged(spec),
+    asked(spec, limit, unit),
     quantity(value, unit),
     h("span", { class: `tag ${passed ? "good" : "bad"}` }, passed ? "met" : "missed"),
     distance === null ? "" : `by ${quantity(Math.abs(distance), unit)}`,
-    { request: "the request", spec_pack: "the spec pack", limits: "the actuators' limits" }[source] ?? source,
+    askedBy(source),
   ]);
   return table(`Verdicts of ${name} at this point`, ["spec", "asked", "found", "verdict", "distance", "asked by"], rows);
 }

@@ -1,15 +1,12 @@
 /** Closed-loop poles of every grid point at once: coloured by the last axis, a symbol for each value of the first. */
 
 import { MARKER_SCALE } from "./envelope_axes.js";
-import { offer } from "./slow_study.js";
+import { plantOf } from "./plant_request.js";
 
 const SYMBOLS = ["circle-open", "x-thin-open", "square-open", "diamond-open", "triangle-up-open", "cross-thin-open", "triangle-down-open", "star-open", "hexagon-open", "pentagon-open"];
 /** How many of each point's slowest poles are sure to be in the picture. */
 const RANGES = [{ value: "2", label: "the two slowest of each point" }, { value: "4", label: "the four slowest of each point" }, { value: "all", label: "all poles" }];
 const PLANTS = [{ value: "closed", label: "closed loop" }, { value: "both", label: "closed loop and plant" }];
-/** Points whose documents are asked for at once; more are begun by a button. */
-const QUICK_POINTS = 60;
-const AT_A_TIME = 4;
 
 export default { id: "poles", title: "Poles over the envelope", group: "envelope", needs: ["controller", "point"], mount };
 
@@ -18,14 +15,12 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
   const choice = h("div", { class: "row" });
   const picture = h("div", {});
   el.append(choice, picture);
-  let documents = null; // of every point; they hold all controllers
+  const asked = new Map(); // controller, or null for the plant -> what the service answered
   choice.append(
     dom.select("Range", RANGES, range(), (value) => setParam("range", value)),
     dom.select("Poles of", PLANTS, plants(), (value) => setParam("of", value)),
   );
-  const count = grid.pointCount(state.get().design);
-  if (count <= QUICK_POINTS) update();
-  else offer(picture, { label: `Compute the poles of ${count} points`, words: "One request a point: some 20 ms each." }, () => load());
+  update();
   return { update, unmount: () => plot.forget(picture) };
 
   function range() {
@@ -38,45 +33,39 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
   }
 
   function update() {
-    if (documents || count <= QUICK_POINTS) load();
+    show(picture, (signal) => Promise.all([closedLoop(signal), plants() === "both" ? plant(signal) : []]), draw);
   }
 
-  function load() {
-    show(picture, async (signal) => (documents ??= await all(signal)), draw);
+  /** Poles of the closed loop: one list a point, empty where the controller has no gains. */
+  async function closedLoop(signal) {
+    const { designId, controller } = state.get();
+    if (!asked.has(controller)) asked.set(controller, (await api.get(`v1/designs/${designId}/controllers/${encodeURIComponent(controller)}/figures`, { signal })).poles.flat());
+    return asked.get(controller).map((poles) => poles ?? []);
   }
 
-  /** Documents of all points, a few at a time. */
-  async function all(signal) {
-    const { designId } = state.get();
-    const found = new Array(count);
-    let next = 0;
-    const take = async () => {
-      while (next < count) {
-        const index = next;
-        next += 1;
-        found[index] = await api.get(`v1/designs/${designId}/points/${index}`, { signal });
-      }
-    };
-    await Promise.all(Array.from({ length: AT_A_TIME }, take));
+  /** Poles of the plant alone: one list a point, empty where there is no plant. */
+  async function plant(signal) {
+    if (!asked.has(null)) asked.set(null, (await api.post("v1/linear-models", plantOf(state.get().design), { signal })).points);
+    const found = Array.from({ length: grid.pointCount(state.get().design) }, () => []);
+    for (const { index, poles } of asked.get(null)) found[index] = poles ?? [];
     return found;
   }
 
-  function draw(points) {
+  function draw([own, free]) {
     const { design, controller, point } = state.get();
-    const own = points.map((one) => one.controllers.find(({ name }) => name === controller)?.poles ?? []);
     if (own.every((poles) => !poles.length)) return dom.message(picture, "empty", `Controller ${controller} has no gains at any point, hence no poles.`);
     const [rows, columns] = design.grid.axes;
     const names = rows.values.map((value) => `${format.words(rows.name)} ${format.quantity(value, format.unitOf(rows.name))}`);
     const traces = [...names.map((name, row) => ofRow(own, row, name)), ...names.map(ofLegend)];
-    if (plants() === "both") traces.push(ofPlant(points));
+    if (plants() === "both") traces.push(ofPlant(free));
     traces.push(ofChosen(own[point] ?? [], point));
-    const shown = plants() === "both" ? [...own, ...points.map((one) => one.poles ?? [])] : own;
+    const shown = plants() === "both" ? [...own, ...free] : own;
     const radius = range() === "all" ? null : slowRadius(shown, Number(range()));
     const limits = radius ? { xaxis: axis("real part [1/s]", [-radius, 0.25 * radius]), yaxis: axis("imaginary part [rad/s]", [-radius, radius], "x") } : {};
     const last = columns.values.length > 1 ? columns.values : [columns.values[0], columns.values[0] + 1];
     const coloraxis = { colorscale: MARKER_SCALE, cmin: last[0], cmax: last.at(-1), colorbar: { title: { text: format.title(columns.name), side: "right" }, thickness: 14 } };
     const worst = Math.max(...own.flat().map(({ re }) => re));
-    const label = `Poles of controller ${controller} at ${count} points, largest real part ${format.number(worst)} 1/s; chosen is ${grid.pointName(design, point)}`;
+    const label = `Poles of controller ${controller} at ${own.length} points, largest real part ${format.number(worst)} 1/s; chosen is ${grid.pointName(design, point)}`;
     return plot.sPlane(picture, traces, { label, layout: { ...limits, coloraxis, uirevision: `${range()} ${plants()} ${controller}` }, onPick: ({ customdata }) => state.set({ point: customdata }) });
   }
 
@@ -92,8 +81,8 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
     return { name, mode: "markers", x: [null], y: [null], hoverinfo: "skip", marker: { symbol: SYMBOLS[row % SYMBOLS.length], size: 10, color: "#76848f", line: { width: 2 } } };
   }
 
-  function ofPlant(points) {
-    const entries = points.flatMap((one, point) => (one.poles ?? []).map((pole) => ({ pole, point })));
+  function ofPlant(free) {
+    const entries = free.flatMap((poles, point) => poles.map((pole) => ({ pole, point })));
     return trace("plant, no control", entries, { symbol: "asterisk-open", size: 8, color: "#76848f", line: { width: 1.2, color: "#76848f" } });
   }
 
