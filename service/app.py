@@ -80,6 +80,8 @@ def create_app(settings: Settings | None = None) -> Application:
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
+        # A redirect would lead to whatever host the client names, and no route declares one.
+        redirect_slashes=False,
         license_info={"name": "MIT", "identifier": "MIT"},
     )
     app.metrics = metrics

@@ -12,6 +12,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
+from starlette.routing import Match
 
 from service import refusals
 from service.pointers import field_refusal
@@ -120,8 +121,21 @@ async def _framework(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     code = FRAMEWORK_CODES.get(error.status_code, "http_error")
     title = HTTPStatus(error.status_code).phrase
-    headers = dict(error.headers) if error.headers else None
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        headers["Allow"] = ", ".join(_methods(request))
     return problem_response(problem(error.status_code, code, title, str(error.detail)), headers)
+
+
+def _methods(request: Request) -> list[str]:
+    """Methods that any route takes at this path: the router names those of the first one alone."""
+    routes, here = request.app.routes, request.scope
+    taken = [
+        method
+        for method in ("GET", "POST", "PUT", "PATCH", "DELETE")
+        if any(route.matches({**here, "method": method})[0] is Match.FULL for route in routes)
+    ]
+    return taken or ["GET"]  # below what is mounted no route is found: files, which are read
 
 
 async def _internal(request: Request, error: Exception) -> Response:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from model.arrays import FloatArray
+from model.arrays import ComplexArray, FloatArray
 from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.hidden_coupling import HiddenCoupling, PlacedCoupling
 from schedules.moving_loop import SPEED
@@ -38,7 +38,7 @@ def hidden_coupling_document(
         "out_of_range": OUTS_OF_RANGE[schedule.rules.out_of_range],
         "sides": list(SIDES),
         "states": list(found.states),
-        "eigenvalues": found.eigenvalues,
+        "eigenvalues": _complex(found.eigenvalues),
         "units": {"growth": f"1/s per {rate}", "deviation": f"deg per {rate}"},
         **{name: _placed(placed) for name, placed in found.placed.items()},
         "comparison": _comparison(found.before_gain.peak, found.after_gain.peak),
@@ -48,11 +48,16 @@ def hidden_coupling_document(
 
 def _placed(placed: PlacedCoupling) -> dict[str, Any]:
     return {
-        "growth": placed.rate_shift,
+        "growth": _complex(placed.rate_shift),
         "settled": np.rad2deg(placed.settled),
         "peak": np.rad2deg(placed.peak),
         "worst": _worst(placed.peak),
     }
+
+
+def _complex(values: ComplexArray) -> ComplexArray:
+    """The same numbers, complex also where all of them happen to be real."""
+    return np.asarray(values, dtype=complex)
 
 
 def _worst(peak: FloatArray) -> dict[str, Any] | None:

@@ -85,7 +85,7 @@ class ActuatorSelectionRequest(Request):
     """Candidates for one actuator of a controller, judged on a manoeuvre and on loads."""
 
     actuator: ActuatorName
-    candidates: Annotated[list[Candidate], Field(min_length=1, max_length=10_000)]
+    candidates: Annotated[list[Candidate], Field(fail_fast=True, min_length=1, max_length=10_000)]
     manoeuvre: Manoeuvre | None = Field(default=None, description="Null: the reference of the design")
     duration_s: Duration | None = Field(
         default=None, description="How long it is followed; null: as long as the design's reference"

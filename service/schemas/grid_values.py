@@ -17,10 +17,11 @@ N = TypeVar("N")
 V = TypeVar("V")
 Part = TypeVar("Part", bound=Request)
 
-Row = Annotated[list[N], Field(min_length=1, max_length=10_000), Tag("array")]
+Row = Annotated[list[N], Field(fail_fast=True, min_length=1, max_length=10_000), Tag("array")]
 #: One number a breakpoint, or one row a breakpoint of the first axis.
 Values = Annotated[
-    list[Annotated[Annotated[N, Tag("number")] | Row[N], BY_JSON_TYPE]], Field(min_length=1, max_length=10_000)
+    list[Annotated[Annotated[N, Tag("number")] | Row[N], BY_JSON_TYPE]],
+    Field(fail_fast=True, min_length=1, max_length=10_000),
 ]
 #: One number N everywhere, or V, an `OverGrid` of such numbers.
 Varying = Annotated[Annotated[N, Tag("number")] | Annotated[V, Tag("object")], BY_JSON_TYPE]

@@ -54,7 +54,9 @@ ListedRow = Annotated[
     Tag("array"),
 ]
 Row = Annotated[ListedRow | Annotated[TableRow, AfterValidator(listed), Tag("object")], BY_JSON_TYPE]
-Rows = Annotated[list[Row], Field(min_length=1, json_schema_extra={"unit": "angles in deg, coefficients 1"})]
+Rows = Annotated[
+    list[Row], Field(fail_fast=True, min_length=1, json_schema_extra={"unit": "angles in deg, coefficients 1"})
+]
 
 CsvText = Annotated[str, Field(min_length=1)]
 ColumnName = Annotated[str, Field(min_length=1, max_length=100)]

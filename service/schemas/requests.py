@@ -131,7 +131,7 @@ class DesignRequest(LinearModelsRequest):
     name: Annotated[str, Field(min_length=1, max_length=200)]
     actuators: Actuators
     reference: Reference
-    controllers: Annotated[list[Controller], Field(min_length=1), AfterValidator(names_unique)]
+    controllers: Annotated[list[Controller], Field(fail_fast=True, min_length=1), AfterValidator(names_unique)]
     spec_pack: AnySpecPack = Field(
         default="default",
         description="Values every controller is judged on, by the name of a shipped pack (`GET /v1/spec-packs`) or as "

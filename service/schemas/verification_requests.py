@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, Field, Tag, model_validator
 
@@ -161,12 +161,17 @@ def altitude_then_speed(axes: list[Breakpoints]) -> list[Breakpoints]:
     return axes
 
 
+T = TypeVar("T")
+#: A value a point of the table; of wrong ones the first is named, for there may be a hundred thousand.
+Plane = Annotated[list[Annotated[list[T], Field(fail_fast=True)]], Field(fail_fast=True)]
+
+
 class TableOfGain(Request):
     """One gain over the table, SI and radians; null where the table has none."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,62}$")]
     unit: Annotated[str, Field(max_length=40)]
-    values: list[list[TableGain | None]] = Field(
+    values: Plane[TableGain | None] = Field(
         json_schema_extra={"unit": "see `unit`"},
         description="``values[i][j]`` belongs to breakpoint i of the altitude and j of the speed",
     )
@@ -184,10 +189,10 @@ class GainTable(Request):
 
     axes: Annotated[list[Breakpoints], Field(min_length=2, max_length=2), AfterValidator(altitude_then_speed)]
     gains: Annotated[list[TableOfGain], Field(min_length=1, max_length=MOST_GAINS)]
-    outcomes: list[list[OutcomeCode]] | None = Field(
+    outcomes: Plane[OutcomeCode] | None = Field(
         default=None, description="Of each point, in the table's shape; null: a point has gains, or it has not"
     )
-    reasons: list[list[Text | None]] | None = Field(default=None, description="Why a point has no gains")
+    reasons: Plane[Text | None] | None = Field(default=None, description="Why a point has no gains")
     format: Text | None = None
     schema_version: int | None = None
     design_id: Text | None = None

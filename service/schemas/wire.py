@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
-from pydantic import BaseModel, ConfigDict
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from service.units import state_units
 
@@ -22,9 +22,20 @@ class Request(BaseModel):
         json_schema_extra=state_units,
     )
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """The schema of the fields, also of a part that leaves some out where it is written: any object otherwise."""
+        return handler(cast("CoreSchema", _as_read(cast("dict[str, Any]", core_schema))))
+
     def normalised(self) -> dict[str, Any]:
         """The request as JSON values, defaults filled in: what is hashed, kept and answered."""
         return self.model_dump(mode="json")
+
+
+def _as_read(schema: dict[str, Any]) -> dict[str, Any]:
+    """A schema of pydantic's core without its serializer, which stands below its validators."""
+    inner = {"schema": _as_read(schema["schema"])} if schema["type"].startswith("function-") else {}
+    return {name: part for name, part in (schema | inner).items() if name != "serialization"}
 
 
 class Answer(BaseModel):
