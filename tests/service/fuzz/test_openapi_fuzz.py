@@ -1,6 +1,7 @@
 """Requests made from the OpenAPI document by Schemathesis, good and bad ones, and what their answers must be.
 
-All checks are on. With ``GAINFIELD_FUZZ_S`` it goes on for so many seconds, with another seed each time.
+All checks are on but one: what fits its schema may still be refused with 422, for schemas do not say what fields demand
+of each other. With ``GAINFIELD_FUZZ_S`` it goes on for so many seconds, with another seed each time.
 """
 
 from __future__ import annotations

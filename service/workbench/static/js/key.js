@@ -37,7 +37,7 @@ function asked(reason) {
       h("p", {}, h("label", { for: "api-key" }, "API key "), field),
       h("p", { class: "muted" }, "It is kept until this tab is closed."),
       h("div", { class: "row" }, taken, given_up));
-    const dialog = h("dialog", { class: "surface" }, form);
+    const dialog = h("dialog", { class: "surface", "aria-label": "A key is needed" }, form);
     let found = false;
     form.addEventListener("submit", (event) => {
       event.preventDefault();
