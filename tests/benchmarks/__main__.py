@@ -16,12 +16,23 @@ from importlib.metadata import version  # noqa: E402
 from importlib.util import find_spec  # noqa: E402
 
 from model.memory import keep_freed_memory  # noqa: E402
-from tests.benchmarks.measure import measure  # noqa: E402
+from tests.benchmarks.cases import case  # noqa: E402
+from tests.benchmarks.http_load import (  # noqa: E402
+    CONNECTIONS,
+    MEDIAN_GOAL,
+    RATE_GOAL,
+    cached_load,
+    cold_row,
+    served_here,
+)
+from tests.benchmarks.measure import Row, measure  # noqa: E402
 from tests.benchmarks.rows import rows  # noqa: E402
 from tests.benchmarks.slider_latency import GOAL, MOVES, latencies  # noqa: E402
 
 #: Name of the rows that have no peer: what moves in the workbench.
 SLIDERS = "slider"
+#: Name of the rows of the running service.
+HTTP = "over HTTP"
 
 
 def main() -> None:
@@ -39,18 +50,36 @@ def main() -> None:
     )
     print(f"{'job':<44} {'peer':<28} {'ours ms':>9} {'peer ms':>9} {'ratio':>7} {'spread':>15} {'goal':>6}")
     for row in rows():
-        if arguments.only not in row.job:
-            continue
-        done = measure(row, arguments.repeats)
-        low, high = done.spread
-        verdict = "met" if done.ratio >= row.goal else "MISSED"
-        print(
-            f"{row.job:<44} {row.peer:<28} {1e3 * min(done.ours):>9.2f} {1e3 * min(done.theirs):>9.1f} "
-            f"{done.ratio:>7.1f} {low:>7.1f}..{high:<6.1f} {row.goal:>6g} {verdict}",
-            flush=True,
-        )
+        if arguments.only in row.job:
+            _compare(row, arguments.repeats)
+    if arguments.only in HTTP:
+        _over_http(arguments.repeats)
     if arguments.only in SLIDERS:
         _sliders()
+
+
+def _compare(row: Row, repeats: int) -> None:
+    """Print the line of a comparison."""
+    done = measure(row, repeats)
+    low, high = done.spread
+    verdict = "met" if done.ratio >= row.goal else "MISSED"
+    print(
+        f"{row.job:<44} {row.peer:<28} {1e3 * min(done.ours):>9.2f} {1e3 * min(done.theirs):>9.1f} "
+        f"{done.ratio:>7.1f} {low:>7.1f}..{high:<6.1f} {row.goal:>6g} {verdict}",
+        flush=True,
+    )
+
+
+def _over_http(repeats: int) -> None:
+    """Print the lines of the running service: one has a peer, two have goals of their own."""
+    with served_here() as served:
+        _compare(cold_row(case(), served), repeats)
+        load = cached_load(served)
+    verdict = "met" if load.median < MEDIAN_GOAL else "MISSED"
+    print(f"{'cached design over HTTP, median':<73} {1e3 * load.median:>9.2f} of {1e3 * MEDIAN_GOAL:g} ms {verdict}")
+    verdict = "met" if load.rate > RATE_GOAL else "MISSED"
+    words = f"the same from {CONNECTIONS} connections"
+    print(f"{words:<73} {load.rate:>9.0f} of {RATE_GOAL:g} requests/s {verdict}", flush=True)
 
 
 def _sliders() -> None:

@@ -147,8 +147,11 @@ def control_steps(loop: Loop) -> FloatArray:
     return np.array(peaks)
 
 
-def control_whole(plant: PlantEnvelope, weights: ExplicitWeights) -> bytes:
-    """The whole request point by point: LQR on the given linear model, locus, margins, step, metrics, peaks, JSON."""
+def control_whole(plant: PlantEnvelope, weights: ExplicitWeights, locus: bool = True) -> bytes:
+    """The whole request point by point: LQR on the given linear model, locus, margins, step, metrics, peaks, JSON.
+
+    Without `locus` neither the locus nor the samples of the step are written: what a design holds.
+    """
     answer = []
     gains = np.concatenate([[0.0], np.geomspace(0.01, 100.0, GAINS - 1)])
     time = np.linspace(0.0, DURATION, SAMPLES)
@@ -158,21 +161,23 @@ def control_whole(plant: PlantEnvelope, weights: ExplicitWeights) -> bytes:
         A[:4, :4], A[4, 2], B[:4] = model.A, -1.0, model.B
         K, _, poles = ct.lqr(A, B, weights.Q, weights.R, method="scipy")
         cuts = [ct.ss(A - B[:, [1 - i]] @ K[[1 - i]], B[:, [i]], K[[i]], 0) for i in range(2)]
-        loci = ct.root_locus_map(cuts[0], gains=gains).loci
         found = [_margins_of(cut) for cut in cuts]
         system = _step_system(A, B, K)
         outputs = ct.forced_response(system, time, np.full(SAMPLES, STEP)).outputs
         peaks = np.max(np.abs(outputs), axis=1)
         metrics = ct.step_info(outputs[0], T=time, yfinal=STEP)
         bandwidth = ct.bandwidth(system[0, 0])
-        answer.append(
-            {
-                "K": K.tolist(), "poles": [[p.real, p.imag] for p in poles], "gains": gains.tolist(),
-                "loci": [[[z.real, z.imag] for z in row] for row in loci],
-                "margins": found, "metrics": {k: float(v) for k, v in metrics.items()}, "bandwidth": bandwidth,
-                "time": time.tolist(), "outputs": outputs.tolist(), "peaks": peaks.tolist(),
-            }
-        )  # fmt: skip
+        point = {
+            "K": K.tolist(), "poles": [[p.real, p.imag] for p in poles], "margins": found,
+            "metrics": {k: float(v) for k, v in metrics.items()}, "bandwidth": bandwidth, "peaks": peaks.tolist(),
+        }  # fmt: skip
+        if locus:
+            loci = ct.root_locus_map(cuts[0], gains=gains).loci
+            point |= {
+                "gains": gains.tolist(), "loci": [[[z.real, z.imag] for z in row] for row in loci],
+                "time": time.tolist(), "outputs": outputs.tolist(),
+            }  # fmt: skip
+        answer.append(point)
     return json.dumps(answer).encode()
 
 
