@@ -4,6 +4,8 @@
 PYTHON ?= $(firstword $(foreach p,python3 python3.13 python3.12 python3.11,$(shell $(p) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $(p))))
 HOST ?= 127.0.0.1
 PORT ?= 8000
+# One more than there are cores: many tests wait for a server or a browser.
+WORKERS ?= $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 BIN := .venv/bin
 CONSTRAINTS := .ci/constraints.txt
 
@@ -18,7 +20,7 @@ serve: .venv/ready
 	$(BIN)/python -m service --host $(HOST) --port $(PORT)
 
 test: lint
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
 lint: .venv/ready-dev
 	$(BIN)/ruff check
