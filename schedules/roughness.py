@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -35,12 +36,12 @@ class AxisRoughness(GridArrays):
     axis: str
     errors: FloatArray
 
-    @property
+    @cached_property
     def point(self) -> int | None:
         """Flat row-major index of the largest error; None where there is none."""
         return _largest(self.errors)
 
-    @property
+    @cached_property
     def worst(self) -> float | None:
         """Size of the largest error [-]; None where there is none."""
         return None if self.point is None else float(np.abs(self.errors.flat[self.point]))
@@ -57,13 +58,13 @@ class Roughness:
 
     axes: tuple[AxisRoughness, ...]
 
-    @property
+    @cached_property
     def point(self) -> int | None:
         """Flat row-major index of the largest error along any axis; None where there is none."""
         found = [axis for axis in self.axes if axis.worst is not None]
         return max(found, key=lambda axis: axis.worst or 0.0).point if found else None
 
-    @property
+    @cached_property
     def worst(self) -> float | None:
         """Size of the largest error along any axis [-]; None where there is none."""
         return max((axis.worst for axis in self.axes if axis.worst is not None), default=None)

@@ -11,6 +11,7 @@ from pathlib import Path
 PACKAGES = ("model", "design", "schedules", "service")
 
 
+@cache
 def release() -> str:
     """Version of the installed distribution; ``0+unknown`` in a checkout that was never installed."""
     try:
@@ -30,6 +31,7 @@ def code_version() -> str:
     return f"{release()}+{digest.hexdigest()[:12]}"
 
 
+@cache
 def solver() -> str:
     """The numerical libraries at work, with their versions."""
     return f"numpy {version('numpy')}, scipy {version('scipy')}"

@@ -51,17 +51,17 @@ class Served:
         """A connection that stays open."""
         return http.client.HTTPConnection("127.0.0.1", self._port, timeout=60.0)
 
-    def post(self, connection: http.client.HTTPConnection, body: dict[str, Any]) -> bytes:
-        """The answer to a design request that the server does not know."""
-        connection.request("POST", "/v1/designs", json.dumps(body), {"Content-Type": "application/json"})
+    def post(self, connection: http.client.HTTPConnection, path: str, body: dict[str, Any]) -> bytes:
+        """The answer to a request that the server does not know."""
+        connection.request("POST", path, json.dumps(body), {"Content-Type": "application/json"})
         answer = connection.getresponse()
         content = answer.read()
-        assert answer.status == 201, content[:300]
+        assert answer.status in (200, 201), content[:300]
         return content
 
 
-def cold_row(case: Case, served: Served) -> Row:
-    """A new design of 25 points, from JSON to JSON and on the disk."""
+def cold_rows(case: Case, served: Served) -> tuple[Row, Row]:
+    """A new design of 25 points, from JSON to JSON: looked at only, and on the disk before it is answered."""
     request = example("wind_tunnel")
     request["grid"] = {
         "altitude_m": np.linspace(0.0, 6000.0, 5).tolist(),
@@ -71,23 +71,34 @@ def cold_row(case: Case, served: Served) -> Row:
     connection, numbers = served.connection(), count()
 
     def agree(ours: bytes, theirs: bytes) -> None:
-        gains = {gain["name"]: gain["values"] for gain in json.loads(ours)["controllers"][0]["gains"]}
+        document = json.loads(ours)
+        designed = document.get("design", document)["controllers"][0]
+        gains = {gain["name"]: gain["values"] for gain in designed["gains"]}
         K = np.array([point["K"] for point in json.loads(theirs)])
         for i, u in enumerate(("T_t", "T_a")):
             for j, x in enumerate(("dt", "dt_rate", "da", "da_rate", "int_a")):
                 np.testing.assert_allclose(np.ravel(gains[f"K_{u}_{x}"]), K[:, i, j], rtol=1e-6, atol=1e-9)
 
-    return Row(
-        "new design over HTTP, kept on the disk", "python-control loop", 40.0,
-        lambda: served.post(connection, request | {"name": f"bench {next(numbers)}"}),
-        lambda: peers.control_whole(case.plant, case.weights, locus=False), agree,
-    )  # fmt: skip
+    def theirs() -> bytes:
+        return peers.control_whole(case.plant, case.weights, locus=False)
+
+    def looked_at() -> bytes:
+        return served.post(connection, "/v1/previews", {"request": request})
+
+    def kept() -> bytes:
+        return served.post(connection, "/v1/designs", request | {"name": f"bench {next(numbers)}"})
+
+    peer = "python-control loop"
+    return (
+        Row("new design over HTTP, looked at", peer, 40.0, looked_at, theirs, agree),
+        Row("new design over HTTP, synced to the disk", peer, 20.0, kept, theirs, agree),
+    )
 
 
 def cached_load(served: Served) -> Load:
     """Ask for one design again and again."""
     first = served.connection()
-    ident = json.loads(served.post(first, example("wind_tunnel") | {"name": "bench, cached"}))["id"]
+    ident = json.loads(served.post(first, "/v1/designs", example("wind_tunnel") | {"name": "bench, cached"}))["id"]
     alone = _asked(first, ident)
     connections = [served.connection() for _ in range(CONNECTIONS)]
     for each in connections:
