@@ -7,6 +7,7 @@ import { figureTable, reasonList, verdictLine } from "./point_figures.js";
 
 const STUDIES = ["point", "root_locus", "response"];
 const SAMPLES = 301;
+const GAINS = 150; // on a locus that is drawn anew with every move; poles between them are found along the branches
 
 export default { id: "root-locus", title: "Root locus", group: "point", needs: ["controller", "point"], mount };
 
@@ -56,7 +57,7 @@ function mount(el, context) {
   }
 
   function query() {
-    return { loop: wantedLoop(), samples: SAMPLES };
+    return { loop: wantedLoop(), samples: SAMPLES, gains: GAINS };
   }
 
   /** Where a loop is opened at an actuator, a factor on it moves the poles. */
