@@ -264,8 +264,11 @@ def _made_again(stored: StoredDesign) -> DesignedEnvelope:
 
 
 def _from_parts(request: DesignRequest, stored: StoredDesign) -> DesignedEnvelope | None:
-    """The envelope from the pieces it was made of; None where they are not kept, or of a code that cut otherwise."""
-    if stored.parts is None:
+    """The envelope from the pieces it was made of; None where they are not kept, or are of other code.
+
+    Pieces hold figures as well as gains: those of other code would pass for this code's, and its gains for found again.
+    """
+    if stored.parts is None or stored.version != code_version():
         return None
     try:
         return run(study_of.study(request), [Synthesised.from_bytes(piece) for piece in cut(stored.parts)])
