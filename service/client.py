@@ -202,7 +202,8 @@ class Client:
 
     def schedule(self, design: Document | str, controller: str, suffix: str, **rules: str) -> bytes:
         """The gain-schedule file of a controller: ``json csv mat npz h c m xml dml h5``."""
-        return self._send("GET", f"/v1/designs/{_id(design)}/schedules/{controller}.{suffix}", params=rules).content
+        path = f"/v1/designs/{_id(design)}/schedules/{controller}.{suffix}"
+        return self._settled(self._send("GET", path, params=rules), None).content
 
     def save_schedule(self, design: Document | str, controller: str, path: str | Path, **rules: str) -> Path:
         """The same, saved under a name that ends in the format's suffix."""
@@ -236,19 +237,8 @@ class Client:
         Problem : the job failed
         JobEnded : it was cancelled
         """
-        pause = FIRST_LOOK
-        while not (found := self.job(job)).ended:
-            if progress is not None:
-                progress(found)
-            time.sleep(pause)
-            pause = min(1.5 * pause, LAST_LOOK)
-        if progress is not None:
-            progress(found)
-        if found.result is not None:
-            return self.get(found.result)
-        if found.document["error"] is not None:
-            raise Problem(found.document["error"])
-        raise JobEnded(f"the job {found.id} {found.state}")
+        document: Document = self._result(job, progress).json()
+        return document
 
     # Any route.
 
@@ -262,8 +252,27 @@ class Client:
         return self._document(self._send("POST", path, json=body, params=query, headers=headers), progress)
 
     def _document(self, answer: httpx2.Response, progress: Progress | None) -> Document:
-        document: Document = answer.json()
-        return self.wait(Job.of(document), progress) if answer.status_code == 202 else document
+        document: Document = self._settled(answer, progress).json()
+        return document
+
+    def _settled(self, answer: httpx2.Response, progress: Progress | None) -> httpx2.Response:
+        """The answer itself, be it given at once or by a job."""
+        return self._result(Job.of(answer.json()), progress) if answer.status_code == 202 else answer
+
+    def _result(self, job: Job | str, progress: Progress | None) -> httpx2.Response:
+        pause = FIRST_LOOK
+        while not (found := self.job(job)).ended:
+            if progress is not None:
+                progress(found)
+            time.sleep(pause)
+            pause = min(1.5 * pause, LAST_LOOK)
+        if progress is not None:
+            progress(found)
+        if found.result is not None:
+            return self._send("GET", found.result)
+        if found.document["error"] is not None:
+            raise Problem(found.document["error"])
+        raise JobEnded(f"the job {found.id} {found.state}")
 
     def _items(self, path: str) -> Iterator[Document]:
         cursor: str | None = None

@@ -112,6 +112,14 @@ def test_a_job_is_waited_for(pauses: list[float]) -> None:
     assert pauses == sorted(pauses)
 
 
+def test_a_file_that_a_job_writes_is_the_file(pauses: list[float]) -> None:
+    client, asked = scripted(
+        (202, job("queued")), (200, job("succeeded", 4, result="/v1/jobs/j1/result")), (200, {"proof": "proved"})
+    )
+    assert client.schedule("d1", "nf", "json", certificate="summary") == b'{"proof":"proved"}'
+    assert asked[0].url.params["certificate"] == "summary"
+
+
 @pytest.mark.parametrize(
     ("ended", "error"),
     [
