@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections import Counter, deque
 from collections.abc import Mapping
 from concurrent.futures import Future
@@ -32,7 +31,7 @@ class RunningJob:
     def __init__(self, job: Job, spec: bytes, done: Mapping[int, bytes], version: str) -> None:
         self.job = job
         self.kind: Kind = KINDS[job.kind]
-        self._spec: Document = orjson.loads(zlib.decompress(spec))
+        self._spec: Document = orjson.loads(spec)
         self._tasks = self.kind.plan(self._spec)
         self._results = {number: outcome.result for number, outcome in _usable(done, version)}
         self._waiting = deque(number for number in range(len(self._tasks)) if number not in self._results)

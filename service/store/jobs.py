@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import zlib
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -105,7 +106,7 @@ class JobStore:
             if waiting >= most_queued:
                 return None
             fresh = {
-                "state": "queued", "spec": new.spec, "done": 0, "total": new.total, "result": None,
+                "state": "queued", "spec": packed(new.spec), "done": 0, "total": new.total, "result": None,
                 "result_blob": None, "error": None, "created_at": time.time(), "started_at": None, "finished_at": None,
             }  # fmt: skip
             if before is not None:
@@ -146,7 +147,7 @@ class JobStore:
         taken = _changed(jobs.c.seq == first, jobs.c.state == "queued").values(values)
         with self._database.writing() as connection:
             row = connection.execute(taken.returning(*_COLUMNS, jobs.c.spec)).first()
-        return None if row is None else (Job(*row[:-1]), row[-1])
+        return None if row is None else (Job(*row[:-1]), unpacked(row[-1]))
 
     def chunks(self, ident: str) -> dict[int, bytes]:
         """Results of the finished tasks of a job by their numbers; those whose file is lost or damaged left out."""
@@ -261,6 +262,16 @@ class JobStore:
             if ended:
                 connection.execute(delete(chunks).where(chunks.c.job_id == ident))
         return ended
+
+
+def packed(spec: bytes) -> bytes:
+    """What a job is about as its row holds it: specs hold whole designs."""
+    return zlib.compress(spec)
+
+
+def unpacked(kept: bytes) -> bytes:
+    """What the row of a job is about; nothing once it has ended."""
+    return zlib.decompress(kept) if kept else b""
 
 
 def _job(connection: Connection, *which: ColumnElement[bool]) -> Job | None:

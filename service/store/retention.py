@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, delete, func, select
 
 from service.store.database import Database
+from service.store.jobs import unpacked
 from service.store.tables import designs, jobs, repeated
 
 _DAY = 86400.0
@@ -92,5 +93,5 @@ def _unused(connection: Connection, kept: Kept, now: float) -> list[str]:
 def _needed(connection: Connection) -> set[str]:
     """Ids that jobs which are not over speak of."""
     wanted = select(jobs.c.spec, jobs.c.result).where(jobs.c.state.in_(_UNFINISHED))
-    texts = ((spec, (result or "").encode()) for spec, result in connection.execute(wanted))
+    texts = ((unpacked(spec), (result or "").encode()) for spec, result in connection.execute(wanted))
     return {ident.decode() for pair in texts for part in pair for ident in _ID.findall(part)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -32,7 +31,7 @@ def answer_job(request: Document, ident: str, designs: Mapping[str, StoredDesign
     """The job that answers a request (`asked`) under these limits, which may be wider than those in line."""
     given = {name: design_document(design) for name, design in designs.items()}
     spec = orjson.dumps(request | {"designs": given, "limits": dict(limits)})
-    return NewJob(ident, ANSWER, zlib.compress(spec), 1)
+    return NewJob(ident, ANSWER, spec, 1)
 
 
 class AnswerJobs:

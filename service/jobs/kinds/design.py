@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import zlib
 from base64 import b64decode, b64encode
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -32,7 +31,7 @@ def design_job(request: DesignRequest, owner: str) -> NewJob:
     """
     spec = orjson.dumps({"request": canonical(request).decode()})
     ident = hashlib.sha256(f"{DESIGN} {owner} {design_id(request)}".encode()).hexdigest()[:32]
-    return NewJob(ident, DESIGN, zlib.compress(spec), len(parts_of(request)) + 1)
+    return NewJob(ident, DESIGN, spec, len(parts_of(request)) + 1)
 
 
 class DesignJobs:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import zlib
 from base64 import b64decode, b64encode
 from collections.abc import Sequence
 
@@ -38,7 +37,7 @@ def perturbed_job(design: StoredDesign, asked: Perturbed, owner: str) -> NewJob:
     spec = orjson.dumps(words, option=orjson.OPT_SORT_KEYS)
     of = (PERTURBED.encode(), owner.encode(), spec, code_version().encode())
     ident = hashlib.sha256(b"\0".join(of)).hexdigest()[:32]
-    return NewJob(ident, PERTURBED, zlib.compress(spec), len(asked.blocks) + 1)
+    return NewJob(ident, PERTURBED, spec, len(asked.blocks) + 1)
 
 
 class PerturbedJobs:

@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 from sqlalchemy import insert, select, update
 
+from service.jobs.kinds.answer import answer_job, asked
 from service.settings import Settings
 from service.store.designs import StoredDesign
+from service.store.jobs import packed
 from service.store.store import Store
 from service.store.tables import chunks, designs, jobs, ownerships, repeated
 from tests.service.store.test_designs import at_once
@@ -28,7 +30,7 @@ def used(store: Store, ident: str, days_ago: float) -> None:
 
 
 def add_job(store: Store, ident: str, state: str, finished_at: float | None, spec: bytes = b"{}") -> None:
-    values = {"id": ident, "owner": "local", "kind": "answer", "state": state, "spec": spec, "created_at": 0.0}
+    values = {"id": ident, "owner": "local", "kind": "answer", "state": state, "spec": packed(spec), "created_at": 0.0}
     counts = {"done": 0, "total": 1, "revision": 0, "attempts": 0, "finished_at": finished_at}
     blob = store.blobs.put(b"result of " + ident.encode())
     with store.database.writing() as connection:
@@ -96,6 +98,15 @@ def test_designs_that_jobs_are_about_stay(six: Store, tmp_path: Path) -> None:
     settings = Settings(data_dir=tmp_path, retention_days=1.0, max_stored_bytes=0)
     six.keep_house(settings, time.time())
     assert there(six) == {IDS[0], IDS[1]}
+
+
+def test_the_design_of_a_real_job_stays(six: Store, made: Made, tmp_path: Path) -> None:
+    """Queued as the routes queue it, whatever its row looks like inside."""
+    request = asked("GET", f"/v1/designs/{IDS[0]}/cross-check", "points=0", None)
+    job = six.jobs.add(answer_job(request, "f" * 32, {IDS[0]: made(IDS[0])}, {}), 10)
+    assert job is not None
+    six.keep_house(Settings(data_dir=tmp_path, retention_days=1.0, max_stored_bytes=0), time.time())
+    assert there(six) == {IDS[0]}
 
 
 def test_jobs_that_ended_long_ago_go_with_their_files(store: Store, tmp_path: Path, aged: Age) -> None:
