@@ -135,12 +135,13 @@ def _verdicts(wanted: Document, axes: list[Document]) -> Element:
 
 
 def _worst_figures(figures: Document, axes: list[Document]) -> Element:
-    rows: list[tuple[Content, ...]] = [("decay rate", *_worst("decay_rate_1_s", figures["decay_rate_1_s"], axes))]
-    rows.append(("damping ratio", *_worst("damping_ratio", figures["damping_ratio"], axes)))
+    rows: list[tuple[Content, ...]] = [
+        (words(name), *_worst(name, figures[name], axes, figures)) for name in ("decay_rate_1_s", "damping_ratio")
+    ]
     for loop, margins in figures["margins"].items():
         rows += [(f"{words(name)}, loop cut at the {loop}", *_worst(name, margins[name], axes)) for name in _MARGINS]
     if figures["step"] is not None:
-        rows += [(words(name), *_worst(name, figures["step"][name], axes)) for name in _STEP]
+        rows += [(words(name), *_worst(name, figures["step"][name], axes, figures)) for name in _STEP]
     return table(
         "margins and step, worst over the envelope (a dash: no limit at any point)", ("figure", "worst", "at"), rows
     )
@@ -181,9 +182,20 @@ def _proof(proof: Document | None) -> Element:
     return element("div", element("h3", "Between the grid points"), *lines)
 
 
-def _worst(name: str, values: list[list[float | None]], axes: list[Document]) -> tuple[str, str]:
-    """The worst of a figure over the grid, and where."""
+def _worst(
+    name: str, values: list[list[float | None]], axes: list[Document], figures: Document | None = None
+) -> tuple[str, str]:
+    """The worst of a figure over the grid, and where.
+
+    With `figures`, a point that carries gains and has no such figure is worse than any that has: it is said instead.
+    """
     flat = [(value, point) for point, value in enumerate(one for row in values for one in row) if value is not None]
+    if figures is not None:
+        codes = [code for row in figures["outcomes"] for code in row]
+        without = sorted({point for point, code in enumerate(codes) if code == "ok"} - {point for _, point in flat})
+        if without:
+            more = f" and {len(without) - 1} more" if len(without) > 1 else ""
+            return figures["null_means"][name], place(without[0], axes) + more
     if not flat:
         return NONE, NONE
     # Downward gain margins are negative, and the one nearest to zero is the worst.

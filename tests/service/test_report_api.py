@@ -88,6 +88,22 @@ def test_the_worst_is_the_worst(client: TestClient, design: dict[str, Any]) -> N
         assert number(worst(value for row in values for value in row)) in page.text
 
 
+def test_a_response_that_does_not_settle_is_the_worst(client: TestClient, wanted: dict[str, Any]) -> None:
+    """Followed too briefly at the slow points, the step has no settling time there: not the best of the others."""
+    wanted["reference"]["duration_s"] = 0.2
+    wanted["controllers"] = [{"name": "nf", "kind": "negative_feedback", "gains": {"K_d": 0.0534, "K_p": 1.609, "K_i": 55.73}}]
+    made = client.post("/v1/designs", json=wanted).json()
+    found = client.get(made["links"]["figures"]["nf"]).json()
+    flown = [code == "ok" for row in found["outcomes"] for code in row]
+    settling = [value for row in found["step"]["settling_time_s"] for value in row]
+    assert not all(flown)  # a point without gains has no figure to be the worst
+    unsettled = sum(ok and value is None for ok, value in zip(flown, settling, strict=True))
+    assert 0 < unsettled < sum(flown)
+    page = report(client, made)
+    assert f"settling time {found['null_means']['settling_time_s']} " in page.text
+    assert (f"and {unsettled - 1} more" in page.text) == (unsettled > 1)
+
+
 def test_asks_nobody_and_runs_nothing(client: TestClient, design: dict[str, Any]) -> None:
     page = report(client, design)
     assert not {"script", "link", "img", "iframe", "object"} & set(page.tags)

@@ -110,9 +110,10 @@ function styled(trace, index) {
   };
 }
 
+/** A layout that gives its margins keeps them: margins that grow with the labels draw a plot twice. */
 function themed(layout) {
   const ink = colour("--ink");
-  const axis = { gridcolor: colour("--line"), linecolor: colour("--line-strong"), zerolinecolor: colour("--line-strong"), ticks: "outside", tickcolor: colour("--line-strong"), automargin: true };
+  const axis = { gridcolor: colour("--line"), linecolor: colour("--line-strong"), zerolinecolor: colour("--line-strong"), ticks: "outside", tickcolor: colour("--line-strong"), automargin: layout.margin === undefined };
   const axes = Object.keys(layout).filter((key) => /^[xy]axis\d*$/.test(key));
   const themedAxes = Object.fromEntries([...new Set(["xaxis", "yaxis", ...axes])].map((key) => [key, { ...axis, ...layout[key] }]));
   return {
