@@ -24,6 +24,8 @@ from service.settings import Settings
 FLAGS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--enable-unsafe-swiftshader"]
 SCHEMES = ("light", "dark")
 HEIGHT = 860
+#: Views that are of a state feedback only.
+OF_LQR = ("weights", "point-weights", "phase")
 #: What is under way in a page, or awaits the reader.
 BUSY = "[aria-busy], .message.loading"
 
@@ -54,6 +56,7 @@ def addresses(tab: Any, first: str, other: str) -> dict[str, str]:
     """What is behind ``#`` for every panel and view, by the name of its picture."""
     hashes = tab.locator(".view-list a").evaluate_all("all => all.map(one => one.getAttribute('href'))")
     views = {hash_.replace("#/", "").replace("/", "-"): f"{hash_}?design={first}&point=3" for hash_ in hashes}
+    views |= {f"explore-{view}": f"{views[f'explore-{view}']}&controller=lqr" for view in OF_LQR}
     panels = {panel: f"#/{panel}?design={first}" for panel in ("define", "download", "jobs")}
     compared = f"#/compare?design={first}&with={other}&controller=nf&point=3&figure=figures.settling_time_s"
     return {"start": "#/explore", **panels, "compare": compared, **views}

@@ -26,12 +26,14 @@ MOVES = 30
 #: What a hand takes for at once [s].
 GOAL = 0.1
 
-#: A gain beside its root locus, the weights of a regulator, a Bode plot: what is open, and the slider that is moved.
+#: What is open, and the slider that is moved: every view that has some.
 SLIDERS = (
     ("gain: root locus, step and margins", "root-locus?controller=nf&loop=K_i", "K_i"),
     ("gain of an inner loop: the same", "root-locus?controller=nf&loop=K_i", "K_p"),
     ("weight: poles, step, torques and margins", "point-weights?controller=lqr", "aileron_deg"),
+    ("weight: gains and demands of the whole grid", "weights?controller=lqr", "aileron_deg"),
     ("gain: Bode plot and margins", "bode?controller=nf", "K_p"),
+    ("gain: Nichols chart and margins", "nichols?controller=nf", "K_p"),
 )
 FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update")
 

@@ -91,7 +91,9 @@ def test_the_worst_is_the_worst(client: TestClient, design: dict[str, Any]) -> N
 def test_a_response_that_does_not_settle_is_the_worst(client: TestClient, wanted: dict[str, Any]) -> None:
     """Followed too briefly at the slow points, the step has no settling time there: not the best of the others."""
     wanted["reference"]["duration_s"] = 0.2
-    wanted["controllers"] = [{"name": "nf", "kind": "negative_feedback", "gains": {"K_d": 0.0534, "K_p": 1.609, "K_i": 55.73}}]
+    wanted["controllers"] = [
+        {"name": "nf", "kind": "negative_feedback", "gains": {"K_d": 0.0534, "K_p": 1.609, "K_i": 55.73}}
+    ]
     made = client.post("/v1/designs", json=wanted).json()
     found = client.get(made["links"]["figures"]["nf"]).json()
     flown = [code == "ok" for row in found["outcomes"] for code in row]

@@ -20,8 +20,7 @@ def flat(rows: Any) -> list[float]:
 
 
 @pytest.mark.parametrize("example", ["wind_tunnel", "airliner_aileron"])
-def test_every_view_draws_and_says_what_it_shows(page: Page, watch: Any, example: str) -> None:
-    watch.refused.add(422)  # a simulation above the work in line, where no job may do more
+def test_every_view_draws_and_says_what_it_shows(page: Page, example: str) -> None:
     page.open("map", page.design(example), controller="lqr", point=3)
     views = page.tab.locator(".view-list a")
     titles = views.all_inner_texts()
@@ -29,7 +28,12 @@ def test_every_view_draws_and_says_what_it_shows(page: Page, watch: Any, example
     for title in titles:
         views.get_by_text(title, exact=True).click()
         assert page.tab.locator(".view > h3").inner_text() == title
-        page.settled()
+        if (example, title) == ("airliner_aileron", "Response in time"):
+            # Its simulation is a job of ten seconds and more; what is exact is there at once.
+            page.tab.get_by_text("is under way").wait_for()
+            page.eventually(page.tab.locator(".plot-canvas .main-svg").count, 12)
+        else:
+            page.settled()
         assert page.tab.locator(".view .message.refused").count() == 0, title
         drawn = page.tab.locator(".plot-canvas .main-svg").count()
         assert drawn >= 1 or title == "Verdicts", title

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -225,3 +226,51 @@ def test_moves_go_into_the_draft(tab: Any, address: str, design: dict[str, Any])
     assert (kept["name"], kept["controllers"][2]["gains"]) == ("mine", wanted)
     other = tab.evaluate(script, [draft | {"controllers": draft["controllers"][:1]}, design, controller])
     assert other["name"] == design["name"]
+
+
+def test_what_is_drawn_follows_the_theme(tab: Any, address: str, design: dict[str, Any]) -> None:
+    """Marks in the colour of ink are seen on both grounds, without being drawn for it by the view."""
+    visit(tab, address, design, "root-locus", controller="nf")
+    tab.locator(DRAWN).last.wait_for()
+    mark = "document.querySelector('.view .plot-canvas').data.find(({name}) => name === 'open-loop poles').marker.color"
+    ink = "getComputedStyle(document.documentElement).getPropertyValue('--ink').trim()"
+    seen = set()
+    for theme in ("light", "dark"):
+        tab.get_by_label("Theme").select_option(theme)
+        until(tab, f"{mark} === {ink}")
+        seen.add(tab.evaluate(mark))
+    assert len(seen) == 2
+
+
+ON_TORQUES = [[4.0, 0.0], [0.0, 0.25]]
+EXPLICIT = {"rule": "explicit", "Q": np.diag([400.0, 0.1, 400.0, 0.1, 9e3]).tolist(), "R": ON_TORQUES}
+OUTPUT = {"rule": "output", "outputs": ["da", "int_a"], "W_y": [[400.0, 0.0], [0.0, 9e3]], "W_u": ON_TORQUES}
+
+
+@pytest.mark.parametrize(("weights", "knob", "path"), [(EXPLICIT, "R_T_a", "R"), (OUTPUT, "W_T_a", "W_u")])
+def test_weights_of_any_rule_move_the_grid(
+    tab: Any, address: str, weights: dict[str, Any], knob: str, path: str
+) -> None:
+    request = example("wind_tunnel")
+    request["controllers"] = [request["controllers"][2] | {"weights": copy.deepcopy(weights)}]
+    design = made(address, request)
+    visit(tab, address, design, "weights", controller="lqr", gain="K_T_a_da")
+    tab.locator(DRAWN).last.wait_for()
+    value = slide(tab, knob, -1.0)
+    assert value == pytest.approx(0.025)
+    settled(tab, knob, value)
+    request["controllers"][0]["weights"][path][1][1] = value
+    gains = made(address, request)["controllers"][0]["gains"]
+    expected = next(gain["values"] for gain in gains if gain["name"] == "K_T_a_da")
+    assert trace(tab, "now, ")["y"] == expected[0]
+
+
+def test_a_view_of_weights_is_opened_with_a_controller_that_has_some(
+    tab: Any, address: str, design: dict[str, Any]
+) -> None:
+    visit(tab, address, design, "bode", controller="pf")
+    tab.locator(DRAWN).last.wait_for()
+    for view in ("Weights over the grid", "Weights of a regulator", "Phase plane"):
+        tab.get_by_role("link", name=view).click()
+        tab.locator(DRAWN).last.wait_for()
+        assert tab.get_by_label("Controller", exact=True).input_value() == "lqr"

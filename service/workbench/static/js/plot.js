@@ -20,8 +20,9 @@ export const FIELD = "Cividis";
 /**
  * Draw traces in an element, or draw what is there anew.
  * @param {Element} el kept between calls; it gets a canvas and a table of the numbers
- * @param {Object[]} traces of Plotly; lines and markers without style get colours, dashes and symbols by their order
- * @param {Object} layout of Plotly; `xaxis: {title: {text}}` with units
+ * @param {Object[]} traces of Plotly; lines and markers without style get colours, dashes and symbols by their order; a colour
+ *   may be named as in the style sheet, e.g. `--ink`, and then follows the theme
+ * @param {Object} layout of Plotly, with such colours; `xaxis: {title: {text}}` with units
  * @param {{label: string, onPick?: function(Object): void, height?: number}} options `label` says in words what is shown; `onPick` is told Plotly's point that was clicked
  * @returns {Promise<void>} when it is drawn
  */
@@ -72,7 +73,7 @@ function render(el, plot) {
   const canvas = canvasOf(el);
   canvas.setAttribute("aria-label", plot.label);
   canvas.style.height = `${plot.height}px`;
-  globalThis.Plotly.react(canvas, plot.traces.map(styled), themed(plot.layout), CONFIG).then(hideParts);
+  globalThis.Plotly.react(canvas, plot.traces.map(styled).map(coloured), coloured(themed(plot.layout)), CONFIG).then(hideParts);
   if (canvas.dataset.listens !== "yes") {
     canvas.dataset.listens = "yes";
     canvas.on("plotly_click", (event) => drawn.get(el)?.onPick?.(event.points[0]));
@@ -97,10 +98,18 @@ function canvasOf(el) {
   return made;
 }
 
+/** Names of the style sheet's colours replaced by the colours that they stand for now; numbers are left alone. */
+function coloured(part) {
+  if (typeof part === "string") return part.startsWith("--") ? colour(part) : part;
+  if (Array.isArray(part)) return part[0] !== null && typeof part[0] === "object" ? part.map(coloured) : part;
+  if (part === null || typeof part !== "object" || ArrayBuffer.isView(part)) return part;
+  return Object.fromEntries(Object.entries(part).map(([key, value]) => [key, coloured(value)]));
+}
+
 /** Style by order where the trace says none, never by colour alone. */
 function styled(trace, index) {
   if (!["scatter", "scattergl", undefined].includes(trace.type)) return trace;
-  const own = colour(`--series-${(index % 7) + 1}`);
+  const own = `--series-${(index % 7) + 1}`;
   const mode = trace.mode ?? "lines";
   return {
     ...trace,
@@ -112,17 +121,16 @@ function styled(trace, index) {
 
 /** A layout that gives its margins keeps them: margins that grow with the labels draw a plot twice. */
 function themed(layout) {
-  const ink = colour("--ink");
-  const axis = { gridcolor: colour("--line"), linecolor: colour("--line-strong"), zerolinecolor: colour("--line-strong"), ticks: "outside", tickcolor: colour("--line-strong"), automargin: layout.margin === undefined };
+  const axis = { gridcolor: "--line", linecolor: "--line-strong", zerolinecolor: "--line-strong", ticks: "outside", tickcolor: "--line-strong", automargin: layout.margin === undefined };
   const axes = Object.keys(layout).filter((key) => /^[xy]axis\d*$/.test(key));
   const themedAxes = Object.fromEntries([...new Set(["xaxis", "yaxis", ...axes])].map((key) => [key, { ...axis, ...layout[key] }]));
   return {
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
-    font: { family: colour("--sans"), size: 12, color: ink },
+    font: { family: "--sans", size: 12, color: "--ink" },
     margin: { l: 60, r: 16, t: 24, b: 48 },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
-    hoverlabel: { bgcolor: colour("--surface"), bordercolor: colour("--line-strong"), font: { color: ink } },
+    hoverlabel: { bgcolor: "--surface", bordercolor: "--line-strong", font: { color: "--ink" } },
     uirevision: "kept", // zoom stays while numbers change
     ...layout,
     ...themedAxes,

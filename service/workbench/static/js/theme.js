@@ -1,6 +1,7 @@
 /** Light or dark: the system's choice, or the reader's, which this browser keeps. */
 
 const KEY = "gainfield-theme";
+const read = new Map(); // custom properties of the theme that is shown: reading one makes the browser work out styles
 const DARK = window.matchMedia("(prefers-color-scheme: dark)");
 
 /** Set up the switch in the header; a `themechange` event of the document follows every change. */
@@ -18,6 +19,7 @@ export function install() {
     const theme = control.value === "auto" ? (DARK.matches ? "dark" : "light") : control.value;
     if (document.documentElement.dataset.theme === theme) return;
     document.documentElement.dataset.theme = theme;
+    read.clear();
     document.dispatchEvent(new CustomEvent("themechange"));
   }
 }
@@ -28,7 +30,8 @@ export function install() {
  * @returns {string}
  */
 export function colour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  if (!read.has(name)) read.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return read.get(name);
 }
 
 function kept() {

@@ -83,7 +83,10 @@ function mountDesign(el, { api, state }) {
   function choose(event, one) {
     if (event.ctrlKey || event.metaKey || event.shiftKey) return;
     event.preventDefault();
-    state.set({ view: one.id, params: {} });
+    const { design, controller } = state.get();
+    const fits = ({ kind }) => !one.kind || kind === one.kind;
+    const chosen = design.controllers.find(({ name }) => name === controller);
+    state.set({ view: one.id, params: {}, controller: (fits(chosen) ? chosen : design.controllers.find(fits) ?? chosen).name });
   }
 
   function showBar() {

@@ -1,9 +1,9 @@
 /** Bode plots of the loop with its margins, and of what else the loop does: S, T, KS, reference, disturbances, noise. */
 
 import { liveController } from "./live/live.js";
+import { AT_POINT } from "./live/scope.js";
 import { cutLoop, decibels, marginMarks } from "./loop_curves.js";
 import { figureTable, reasonList, verdictLine } from "./point_figures.js";
-import { colour } from "../theme.js";
 
 const STUDIES = ["point", "frequency_response"];
 const FREQUENCIES = 240;
@@ -23,7 +23,7 @@ function mount(el, context) {
   const { h } = dom;
   const choice = h("div", { class: "row" });
   el.append(choice);
-  const live = liveController(el, context, { studies: STUDIES, query: () => ({ frequencies: FREQUENCIES }), onAnswer });
+  const live = liveController(el, context, { scope: AT_POINT, studies: STUDIES, query: () => ({ frequencies: FREQUENCIES }), onAnswer });
   const picture = h("div", {});
   const figures = h("div", { class: "stack" });
   live.body.append(h("div", { class: "live-wide" }, picture, figures));
@@ -87,7 +87,7 @@ function mount(el, context) {
     const curveOf = ({ frequency_response: found }) => (set === "loop" ? cutLoop(found, from) : decibels(found, found[set].find((one) => one.from === from && one.to === to)));
     const [mine, first] = [curveOf(answer.now), curveOf(answer.designed)];
     const marks = set === "loop" ? marginMarks(mine, answer.now.point.controllers[0].margins[from]) : [];
-    const traces = [...curveTraces(first, "as designed", { color: "#8894a0", width: 1.3, dash: "dash" }), ...curveTraces(mine, "now", { color: colour("--series-1"), width: 2.2, dash: "solid" }), ...markTraces(marks)];
+    const traces = [...curveTraces(first, "as designed", { color: "--line-strong", width: 1.3, dash: "dash" }), ...curveTraces(mine, "now", { color: "--series-1", width: 2.2, dash: "solid" }), ...markTraces(marks)];
     const said = marks.map(({ words, omega }) => `${words} at ${omega.toPrecision(4)} rad/s`).join(", ");
     return plot.draw(picture, traces, layout(marks), { label: `Magnitude and phase over frequency: ${group}, ${label}${said ? `; ${said}` : ""}`, height: 560 });
   }
@@ -106,17 +106,16 @@ function markTraces(marks) {
   const segments = (found, read) => ({ x: found.flatMap(({ omega }) => [omega, omega, null]), y: found.flatMap((mark) => [...read(mark), null]) });
   const style = (color, symbol) => ({ mode: "lines+markers", line: { color, dash: "solid", width: 2 }, marker: { color, symbol, size: 7 } });
   const traces = [
-    { name: "gain margins", ...segments(of("gain"), ({ db }) => [db, 0]), ...style(colour("--series-2"), "diamond") },
-    { name: "phase margins", yaxis: "y2", ...segments(of("phase"), ({ phase, size }) => [phase, phase - size]), ...style(colour("--series-3"), "square") },
-    { name: "nearest to the disk", x: of("disk").map(({ omega }) => omega), y: of("disk").map(({ db }) => db), mode: "markers", marker: { color: colour("--series-4"), symbol: "circle-open", size: 11, line: { width: 2 } } },
+    { name: "gain margins", ...segments(of("gain"), ({ db }) => [db, 0]), ...style("--series-2", "diamond") },
+    { name: "phase margins", yaxis: "y2", ...segments(of("phase"), ({ phase, size }) => [phase, phase - size]), ...style("--series-3", "square") },
+    { name: "nearest to the disk", x: of("disk").map(({ omega }) => omega), y: of("disk").map(({ db }) => db), mode: "markers", marker: { color: "--series-4", symbol: "circle-open", size: 11, line: { width: 2 } } },
   ];
   return traces.filter(({ x }) => x.length);
 }
 
 function layout(marks) {
-  const ink = colour("--line-strong");
   const turns = [...new Set(marks.filter(({ kind }) => kind === "phase").map(({ phase, size }) => Math.round(phase - size)))];
-  const line = (yref, y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, yref, y0: y, y1: y, line: { color: ink, width: 1, dash: "dot" } });
+  const line = (yref, y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, yref, y0: y, y1: y, line: { color: "--line-strong", width: 1, dash: "dot" } });
   const note = (mark, yref, y) => ({ xref: "x", yref, x: Math.log10(mark.omega), y, text: mark.words, showarrow: false, xanchor: "left", xshift: 8, font: { size: 11 } });
   const beside = { gain: (mark) => note(mark, "y", mark.db / 2), phase: (mark) => note(mark, "y2", mark.phase - mark.size / 2) };
   return {

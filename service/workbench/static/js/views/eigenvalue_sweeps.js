@@ -114,7 +114,7 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
       y: branch.map((pole) => pole?.im ?? null),
       text: values.map((value) => `${heading} ${format.number(value)}`),
       hovertemplate: "%{text}<br>%{x:.4~r}, %{y:.4~r}<extra></extra>",
-      line: { width: 1.2, color: "#76848f", dash: "solid" },
+      line: { width: 1.2, color: "--line-strong", dash: "solid" },
       marker: { color: values, coloraxis: "coloraxis", size: 5 },
       showlegend: false,
     }));

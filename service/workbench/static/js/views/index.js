@@ -1,6 +1,7 @@
 /**
  * The views of the Explore panel, in the order of the list.
- * A view: `{id, title, group: "point" | "envelope", needs: ("point" | "controller")[], mount(el, context) -> {update(changed), unmount()}}`.
+ * A view: `{id, title, group: "point" | "envelope", needs: ("point" | "controller")[], mount(el, context) -> {update(changed), unmount()}}`;
+ * `kind`: of the only controllers that it is for, if it is not for all of them.
  * It draws itself once when it is mounted; `update` follows a change of point, controller or parameters.
  */
 

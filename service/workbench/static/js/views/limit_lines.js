@@ -1,6 +1,5 @@
 /** The actuators' limits as lines of a plot. */
 
-import { colour } from "../theme.js";
 
 const STYLES = { aileron: ["--series-1", "dash"], tab: ["--series-2", "dot"] };
 
@@ -15,11 +14,11 @@ export function limitLines(limits, field, reach) {
   const found = Object.entries(limits).map(([surface, own]) => [surface, own?.[field] ?? null]).filter(([, limit]) => limit !== null && limit <= reach);
   const shapes = found.flatMap(([surface, limit]) => {
     const [name, dash] = STYLES[surface];
-    return [limit, -limit].map((y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: colour(name), width: 1.2, dash } }));
+    return [limit, -limit].map((y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: name, width: 1.2, dash } }));
   });
   const heights = [...new Set(found.map(([, limit]) => limit))];
   const names = (height) => found.filter(([, limit]) => limit === height).map(([surface]) => surface).join(" and ");
-  const annotations = heights.map((limit) => ({ xref: "paper", x: 1, xanchor: "right", y: limit, yanchor: "bottom", text: `limit of ${names(limit)}`, showarrow: false, font: { size: 10, color: colour("--muted") } }));
+  const annotations = heights.map((limit) => ({ xref: "paper", x: 1, xanchor: "right", y: limit, yanchor: "bottom", text: `limit of ${names(limit)}`, showarrow: false, font: { size: 10, color: "--muted" } }));
   return { shapes, annotations };
 }
 

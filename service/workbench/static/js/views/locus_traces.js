@@ -1,7 +1,6 @@
 /** A root locus as traces of a plot, and its poles at any gain. */
 
 import { number } from "../format.js";
-import { colour } from "../theme.js";
 
 const NEAR = 4; // the plot first shows so many times the middle distance of the chosen poles from the origin
 
@@ -41,22 +40,20 @@ export function extentOf(locus) {
  */
 export function locusTraces(locus, { gain, closed, damping, extent }) {
   const markers = (name, points, marker, more = {}) => ({ name, mode: "markers", x: points.map((p) => p.re), y: points.map((p) => p.im), marker, ...more });
-  const ink = colour("--ink");
-  const muted = colour("--line-strong");
   const crossings = locus.crossings.flatMap(({ gain: k, omega_rad_s: omega }) => [omega, -omega].slice(0, omega === 0 ? 1 : 2).map((im) => ({ re: 0, im, k })));
   const breakaways = locus.breakaways.map(({ gain: k, at }) => ({ ...at, k }));
   const told = (points, what) => ({ text: points.map(({ k }) => `${what} at gain ${number(k)}`), hoverinfo: "text" });
   const traces = [
     branches(locus),
-    ray(`damping ratio ${damping}`, damping, 30 * extent, muted),
-    asymptotes(locus, 30 * extent, muted),
-    markers("open-loop poles", locus.branches.map((branch) => branch[0]), { symbol: "x-thin", size: 9, color: ink, line: { width: 1.8, color: ink } }),
-    markers("zeros", locus.arrivals.map(({ at }) => at), { symbol: "circle-open", size: 9, color: ink }),
-    markers("crossings", crossings, { symbol: "diamond-open", size: 9, color: colour("--bad") }, told(crossings, "imaginary axis")),
-    markers("breakaways", breakaways, { symbol: "square-open", size: 8, color: colour("--series-3") }, told(breakaways, "branches meet")),
-    markers("poles at this gain", polesAt(locus, gain), { symbol: "circle", size: 9, color: colour("--series-2"), line: { width: 1, color: colour("--surface") } }),
+    ray(`damping ratio ${damping}`, damping, 30 * extent),
+    asymptotes(locus, 30 * extent),
+    markers("open-loop poles", locus.branches.map((branch) => branch[0]), { symbol: "x-thin", size: 9, color: "--ink", line: { width: 1.8, color: "--ink" } }),
+    markers("zeros", locus.arrivals.map(({ at }) => at), { symbol: "circle-open", size: 9, color: "--ink" }),
+    markers("crossings", crossings, { symbol: "diamond-open", size: 9, color: "--bad" }, told(crossings, "imaginary axis")),
+    markers("breakaways", breakaways, { symbol: "square-open", size: 8, color: "--series-3" }, told(breakaways, "branches meet")),
+    markers("poles at this gain", polesAt(locus, gain), { symbol: "circle", size: 9, color: "--series-2", line: { width: 1, color: "--surface" } }),
   ];
-  if (closed) traces.push(markers("all loops closed", closed, { symbol: "triangle-up-open", size: 10, color: colour("--series-5"), line: { width: 1.6 } }));
+  if (closed) traces.push(markers("all loops closed", closed, { symbol: "triangle-up-open", size: 10, color: "--series-5", line: { width: 1.6 } }));
   return traces.filter(({ x }) => x.length > 0);
 }
 
@@ -70,17 +67,17 @@ function branches({ gains, branches: all }) {
     y: joined((pole) => pole.im),
     customdata: joined((_, gain) => gain),
     hovertemplate: "%{x:.4g} %{y:+.4g}i<br>gain %{customdata:.4g}<extra></extra>",
-    line: { color: colour("--series-1"), dash: "solid", width: 1.6 },
+    line: { color: "--series-1", dash: "solid", width: 1.6 },
   };
 }
 
-function ray(name, damping, length, color) {
+function ray(name, damping, length) {
   const [re, im] = [-damping * length, Math.sqrt(1 - damping ** 2) * length];
-  return { name, mode: "lines", x: [re, 0, re], y: [im, 0, -im], hoverinfo: "skip", line: { color, dash: "dash", width: 1.2 } };
+  return { name, mode: "lines", x: [re, 0, re], y: [im, 0, -im], hoverinfo: "skip", line: { color: "--line-strong", dash: "dash", width: 1.2 } };
 }
 
-function asymptotes({ asymptotes: { centroid, angles_deg: angles } }, length, color) {
+function asymptotes({ asymptotes: { centroid, angles_deg: angles } }, length) {
   const ends = centroid === null ? [] : angles.map((angle) => (angle * Math.PI) / 180);
   const along = (from, read) => ends.flatMap((angle) => [from, from + (length + Math.abs(centroid)) * read(angle), null]);
-  return { name: "asymptotes", mode: "lines", x: along(centroid, Math.cos), y: along(0, Math.sin), hoverinfo: "skip", line: { color, dash: "dot", width: 1.2 } };
+  return { name: "asymptotes", mode: "lines", x: along(centroid, Math.cos), y: along(0, Math.sin), hoverinfo: "skip", line: { color: "--line-strong", dash: "dot", width: 1.2 } };
 }

@@ -1,9 +1,9 @@
 /** The loop as a Nichols or a Nyquist plot, with its margins and the disk that it stays out of. */
 
 import { liveController } from "./live/live.js";
+import { AT_POINT } from "./live/scope.js";
 import { circle, cutLoop, diskCircle, marginMarks, short } from "./loop_curves.js";
 import { figureTable, reasonList, verdictLine } from "./point_figures.js";
-import { colour } from "../theme.js";
 
 const STUDIES = ["point", "frequency_response"];
 const FREQUENCIES = 400;
@@ -18,7 +18,7 @@ function mount(el, context) {
   const { h } = dom;
   const choice = h("div", { class: "row" });
   el.append(choice);
-  const live = liveController(el, context, { studies: STUDIES, query: () => ({ frequencies: FREQUENCIES }), onAnswer });
+  const live = liveController(el, context, { scope: AT_POINT, studies: STUDIES, query: () => ({ frequencies: FREQUENCIES }), onAnswer });
   const picture = h("div", {});
   const figures = h("div", { class: "stack" });
   live.body.append(h("div", { class: "live-wide" }, picture, figures));
@@ -85,14 +85,14 @@ function markers(marks, read) {
     if (!own.length) return [];
     const points = own.map(read);
     const words = own.map((mark) => mark.words);
-    const marker = { symbol, size: kind === "delay" ? 14 : 10, color: colour(name), line: { width: 2 } };
+    const marker = { symbol, size: kind === "delay" ? 14 : 10, color: name, line: { width: 2 } };
     return [{ name: own.length === 1 ? words[0] : `${kind} margins`, x: points.map(([x]) => x), y: points.map(([, y]) => y), text: words, hoverinfo: "text", mode: "markers", marker }];
   });
 }
 
-const NOW = () => ({ color: colour("--series-1"), width: 2.2, dash: "solid" });
-const DESIGNED = { color: "#8894a0", width: 1.3, dash: "dash" };
-const DISK = () => ({ mode: "lines", line: { color: colour("--series-4"), dash: "dot", width: 1.6 }, fill: "toself", fillcolor: "rgba(204, 121, 167, 0.12)", hoverinfo: "skip" });
+const NOW = () => ({ color: "--series-1", width: 2.2, dash: "solid" });
+const DESIGNED = { color: "--line-strong", width: 1.3, dash: "dash" };
+const DISK = () => ({ mode: "lines", line: { color: "--series-4", dash: "dot", width: 1.6 }, fill: "toself", fillcolor: "rgba(204, 121, 167, 0.12)", hoverinfo: "skip" });
 
 function nicholsPlot(mine, first, marks, margins) {
   const phases = mine.phase.filter((value, k) => value !== null && mine.db[k] > WINDOW_DB[0] && mine.db[k] < WINDOW_DB[1]);
@@ -104,7 +104,7 @@ function nicholsPlot(mine, first, marks, margins) {
     ...(disk.length > turns.length ? [{ name: "disk", x: disk.map(([x]) => x), y: disk.map(([, y]) => y), ...DISK() }] : []),
     curve("as designed", first.phase, first.db, DESIGNED, first.omega),
     curve("loop", mine.phase, mine.db, NOW(), mine.omega),
-    { name: "critical", x: turns, y: turns.map(() => 0), mode: "markers", marker: { symbol: "x", size: 10, color: colour("--bad") } },
+    { name: "critical", x: turns, y: turns.map(() => 0), mode: "markers", marker: { symbol: "x", size: 10, color: "--bad" } },
     ...markers(marks, ({ phase, db }) => [phase, db]),
   ];
   const layout = {
@@ -132,7 +132,7 @@ function place({ re, im }, turn) {
 /** Lines of constant closed-loop magnitude |T|, as one trace. */
 function closedLoopLines(turns) {
   const points = turns.flatMap((turn) => CLOSED_LOOP_DB.flatMap((db) => [...closedLoopLine(10 ** (db / 20)).map((value) => place(value, turn)).sort(([a], [b]) => (db <= 0 ? a - b : 0)), [null, null]]));
-  return [{ name: "|T| [dB]", x: points.map(([x]) => x), y: points.map(([, y]) => y), mode: "lines", hoverinfo: "skip", line: { color: colour("--line-strong"), width: 0.7, dash: "solid" } }];
+  return [{ name: "|T| [dB]", x: points.map(([x]) => x), y: points.map(([, y]) => y), mode: "lines", hoverinfo: "skip", line: { color: "--line-strong", width: 0.7, dash: "solid" } }];
 }
 
 /** L = T / (1 - T) for T of one magnitude. */
@@ -150,7 +150,7 @@ function closedLoopNames(turns) {
   return CLOSED_LOOP_DB.filter((db) => db < 0).map((db) => {
     const size = 10 ** (db / 20);
     const [, y] = place({ re: size / (1 - size), im: 0 }, turn);
-    return { x: turn + 179, y: y > WINDOW_DB[1] ? WINDOW_DB[1] : y, text: `${short(db)} dB`, showarrow: false, xanchor: "right", yanchor: "bottom", font: { size: 10, color: colour("--muted") } };
+    return { x: turn + 179, y: y > WINDOW_DB[1] ? WINDOW_DB[1] : y, text: `${short(db)} dB`, showarrow: false, xanchor: "right", yanchor: "bottom", font: { size: 10, color: "--muted" } };
   });
 }
 
@@ -159,12 +159,12 @@ function nyquistPlot(mine, first, marks, margins) {
   const read = (points) => ({ x: points.map(({ re }) => re), y: points.map(({ im }) => im) });
   const disk = diskCircle(margins.disk_margin);
   const traces = [
-    { name: "unit circle", ...read(circle(0, 1)), mode: "lines", hoverinfo: "skip", line: { color: colour("--line-strong"), width: 1, dash: "dot" } },
+    { name: "unit circle", ...read(circle(0, 1)), mode: "lines", hoverinfo: "skip", line: { color: "--line-strong", width: 1, dash: "dot" } },
     ...(disk.length ? [{ name: "disk", ...read(disk), ...DISK() }] : []),
     curve("as designed", first.re, first.im, DESIGNED, first.omega),
-    curve("negative frequencies", mine.re, mirrored, { color: colour("--series-1"), width: 1, dash: "dot" }, mine.omega),
+    curve("negative frequencies", mine.re, mirrored, { color: "--series-1", width: 1, dash: "dot" }, mine.omega),
     curve("loop", mine.re, mine.im, NOW(), mine.omega),
-    { name: "critical", x: [-1], y: [0], mode: "markers", marker: { symbol: "x", size: 10, color: colour("--bad") } },
+    { name: "critical", x: [-1], y: [0], mode: "markers", marker: { symbol: "x", size: 10, color: "--bad" } },
     ...markers(marks, ({ phase, db }) => [10 ** (db / 20) * Math.cos((phase * Math.PI) / 180), 10 ** (db / 20) * Math.sin((phase * Math.PI) / 180)]),
   ];
   const layout = {

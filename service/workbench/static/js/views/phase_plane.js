@@ -10,7 +10,7 @@ const PLANES = [
 const ALL_SAMPLES = 4800;
 const MOST_SAMPLES = 401;
 
-export default { id: "phase", title: "Phase plane", group: "envelope", needs: ["controller", "point"], mount };
+export default { id: "phase", title: "Phase plane", group: "envelope", needs: ["controller", "point"], kind: "lqr", mount };
 
 function mount(el, { api, state, plot, dom, format, grid, param, setParam, show }) {
   const { h } = dom;
@@ -45,9 +45,9 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
     const hover = { text: times.map((time) => `${format.quantity(time, "s")}`), hovertemplate: "%{text}<br>%{x:.4~r}, %{y:.4~r}<extra>%{fullData.name}</extra>" };
     const free = answer.free.map(({ trajectory, aileron_start_deg: a, tab_start_deg: t }, index) => ({
       ...hover, name: index ? `let go at ${format.number(a)}, ${format.number(t)} deg` : `let go (aileron ${format.number(a)}, tab ${format.number(t)} deg, ..)`,
-      x: trajectory[x], y: trajectory[y], mode: "lines", line: { width: 1.2, dash: "solid", color: "#76848f" }, showlegend: index === 0,
+      x: trajectory[x], y: trajectory[y], mode: "lines", line: { width: 1.2, dash: "solid", color: "--line-strong" }, showlegend: index === 0,
     }));
-    const begun = { name: "begins", mode: "markers", x: answer.free.map(({ trajectory }) => trajectory[x][0]), y: answer.free.map(({ trajectory }) => trajectory[y][0]), marker: { symbol: "circle-open", size: 7, color: "#76848f" } };
+    const begun = { name: "begins", mode: "markers", x: answer.free.map(({ trajectory }) => trajectory[x][0]), y: answer.free.map(({ trajectory }) => trajectory[y][0]), marker: { symbol: "circle-open", size: 7, color: "--line-strong" } };
     const step = answer.step ? [
       { ...hover, name: "reference step", x: answer.step[x], y: answer.step[y], mode: "lines", line: { width: 3, dash: "solid", color: "#d55e00" } },
       { name: "end of the step", mode: "markers", x: [answer.step[x].at(-1)], y: [answer.step[y].at(-1)], marker: { symbol: "square", size: 10, color: "#d55e00" } },

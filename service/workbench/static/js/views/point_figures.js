@@ -74,7 +74,7 @@ export function poleTable(poles, caption) {
     const size = Math.hypot(re, im);
     return [complex({ re, im }).replace("+", "\u00b1"), number(size), number(size ? -re / size : null), number(size / (2 * Math.PI)), number(re < 0 ? -1 / re : null)];
   });
-  return table(caption, ["pole [1/s]", "distance [rad/s]", "damping ratio", "[Hz]", "time constant [s]"], rows);
+  return table(caption, ["pole [1/s]", "natural frequency [rad/s]", "damping ratio", "[Hz]", "time constant [s]"], rows);
 }
 
 /** Smallest damping ratio of poles. @param {?{re: number, im: number}[]} poles @returns {?number} */

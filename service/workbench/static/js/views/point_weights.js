@@ -2,28 +2,25 @@
 
 import { drawStep, transient } from "./live/step_plot.js";
 import { liveController } from "./live/live.js";
+import { WEIGHTS_AT_POINT } from "./live/scope.js";
 import { largest, limitLines, limitsOf } from "./limit_lines.js";
 import { figureTable, reasonList, verdictLine } from "./point_figures.js";
-import { colour } from "../theme.js";
 
 const STUDIES = ["point", "response"];
 const SAMPLES = 301;
 
-export default { id: "point-weights", title: "Weights of a regulator", group: "point", needs: ["controller", "point"], mount };
+export default { id: "point-weights", title: "Weights of a regulator", group: "point", needs: ["controller", "point"], kind: "lqr", mount };
 
 function mount(el, context) {
   const { state, plot, dom } = context;
   const { h } = dom;
-  const place = h("div", { class: "stack" });
-  const other = h("div", {});
-  el.append(other, place);
-  const live = liveController(place, context, { studies: STUDIES, query: () => ({ samples: SAMPLES }), onAnswer });
+  const live = liveController(el, context, { scope: WEIGHTS_AT_POINT, studies: STUDIES, query: () => ({ samples: SAMPLES }), onAnswer });
   const [poles, step, torque] = [h("div", {}), h("div", {}), h("div", {})];
   const figures = h("div", { class: "stack" });
   const left = h("div", { class: "stack" }, h("h4", {}, "Closed-loop poles"), poles, h("h4", {}, "Torques"), torque);
   live.body.append(h("div", { class: "live-pair" }, left, h("div", { class: "stack" }, h("h4", {}, "Step response"), step, figures)));
   let extent = null;
-  begin(() => live.start());
+  live.start();
   return { update, unmount };
 
   function unmount() {
@@ -32,22 +29,8 @@ function mount(el, context) {
   }
 
   function update(changed) {
-    if (changed.has("controller") || changed.has("point") || changed.has("design")) extent = null;
-    begin(() => live.update(changed));
-  }
-
-  /** Only regulators have weights. */
-  function begin(go) {
-    const { design, controller } = state.get();
-    const { name, kind } = design.controllers.find((one) => one.name === controller);
-    place.hidden = kind !== "lqr";
-    if (kind === "lqr") {
-      dom.clear(other);
-      go();
-    } else {
-      live.unmount();
-      dom.message(other, "empty", `Controller ${name} has gains and no weights; its sliders are in the view of the root locus. Choose an lqr controller.`);
-    }
+    if (WEIGHTS_AT_POINT.of.some((key) => changed.has(key))) extent = null;
+    live.update(changed);
   }
 
   async function onAnswer({ now, designed }) {
@@ -64,9 +47,9 @@ function mount(el, context) {
     const points = (name, found, marker) => ({ name, mode: "markers", x: found.map(({ re }) => re), y: found.map(({ im }) => im), marker });
     extent ??= 1.2 * Math.max(...first.poles.map(({ re, im }) => Math.hypot(re, im)));
     const traces = [
-      points("open loop", open, { symbol: "x-thin", size: 9, color: colour("--ink"), line: { width: 1.8, color: colour("--ink") } }),
-      points("as designed", first.poles, { symbol: "circle-open", size: 11, color: colour("--line-strong") }),
-      points("now", mine.poles, { symbol: "circle", size: 8, color: colour("--series-2") }),
+      points("open loop", open, { symbol: "x-thin", size: 9, color: "--ink", line: { width: 1.8, color: "--ink" } }),
+      points("as designed", first.poles, { symbol: "circle-open", size: 11, color: "--line-strong" }),
+      points("now", mine.poles, { symbol: "circle", size: 8, color: "--series-2" }),
     ];
     const ranges = {
       xaxis: { title: { text: "real part [1/s]" }, range: [-1.2 * extent, 0.3 * extent] },
@@ -83,8 +66,8 @@ function mount(el, context) {
     const traces = [
       line(now, "aileron", "T_a_n_m", { line: { width: 2.2 } }),
       line(now, "tab", "T_t_n_m", { line: { width: 2.2 } }),
-      line(first, "aileron as designed", "T_a_n_m", { line: { color: "#8894a0", width: 1.2, dash: "solid" } }),
-      line(first, "tab as designed", "T_t_n_m", { line: { color: "#8894a0", width: 1.2, dash: "dot" } }),
+      line(first, "aileron as designed", "T_a_n_m", { line: { color: "--line-strong", width: 1.2, dash: "solid" } }),
+      line(first, "tab as designed", "T_t_n_m", { line: { color: "--line-strong", width: 1.2, dash: "dot" } }),
     ];
     const layout = { xaxis: { title: { text: "time [s]" }, range }, uirevision: String(range), yaxis: { title: { text: "torque [N m]" } }, margin: { l: 56, r: 12, t: 12, b: 44 }, ...limitLines(limits, "torque_n_m", 2 * most) };
     return plot.draw(torque, traces, layout, { label: `Torques of the actuators over the reference step; the largest is ${most.toPrecision(4)} N m`, height: 280 });

@@ -78,12 +78,12 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
 
   /** An entry of the legend: of a trace coloured by a scale Plotly has no single colour to draw there. */
   function ofLegend(name, row) {
-    return { name, mode: "markers", x: [null], y: [null], hoverinfo: "skip", marker: { symbol: SYMBOLS[row % SYMBOLS.length], size: 10, color: "#76848f", line: { width: 2 } } };
+    return { name, mode: "markers", x: [null], y: [null], hoverinfo: "skip", marker: { symbol: SYMBOLS[row % SYMBOLS.length], size: 10, color: "--line-strong", line: { width: 2 } } };
   }
 
   function ofPlant(free) {
     const entries = free.flatMap((poles, point) => poles.map((pole) => ({ pole, point })));
-    return trace("plant, no control", entries, { symbol: "asterisk-open", size: 8, color: "#76848f", line: { width: 1.2, color: "#76848f" } });
+    return trace("plant, no control", entries, { symbol: "asterisk-open", size: 8, color: "--line-strong", line: { width: 1.2, color: "--line-strong" } });
   }
 
   function ofChosen(poles, point) {

@@ -4,7 +4,6 @@ import { largest, limitLines, limitsOf } from "./limit_lines.js";
 import { poleTable, stepTable, verdictTable } from "./point_figures.js";
 import { transient } from "./live/step_plot.js";
 import { limitWords, QUANTITIES, series } from "./response_words.js";
-import { colour } from "../theme.js";
 
 const SAMPLES = ["201", "501", "1001", "2001"];
 
@@ -31,19 +30,25 @@ function mount(el, { api, state, plot, dom, param, setParam, show }) {
     show(place, ask, draw);
   }
 
-  /** The simulation may be refused where the linear response is not: a fast delay, a sampled regulator. */
+  /** The linear response, and a simulation that may take longer, or be refused: of a fast delay, a sampled regulator. */
   async function ask(signal) {
     const { designId, controller, point } = state.get();
     const path = `v1/designs/${designId}/controllers/${controller}/response`;
     const query = { point, samples: samples() };
-    const linear = api.get(path, { signal, query });
-    const simulated = api.get(path, { signal, query: { ...query, kind: "nonlinear" } });
-    const all = await Promise.allSettled([linear, simulated, api.get(`v1/designs/${designId}/points/${point}`, { signal })]);
-    for (const one of [all[0], all[2]]) if (one.reason) throw one.reason;
-    return { linear: all[0].value, simulated: all[1].value ?? null, refused: all[1].reason ?? null, point: all[2].value };
+    const simulation = api.get(path, { signal, query: { ...query, kind: "nonlinear" } }).then((simulated) => ({ simulated }), (refused) => ({ refused }));
+    const [linear, at] = await Promise.all([api.get(path, { signal, query }), api.get(`v1/designs/${designId}/points/${point}`, { signal })]);
+    return { linear, point: at, simulation };
   }
 
-  function draw({ linear, simulated, refused, point }) {
+  /** What is exact is shown while the simulation is under way. */
+  async function draw({ simulation, ...exact }) {
+    await drawWith(exact, {});
+    const found = await simulation;
+    if (found.refused?.name === "AbortError") throw found.refused;
+    await drawWith(exact, found);
+  }
+
+  function drawWith({ linear, point }, { simulated = null, refused = null }) {
     const { design, controller: name } = state.get();
     const limits = limitsOf(design, name);
     const own = point.controllers.find((one) => one.name === name);
@@ -67,6 +72,7 @@ function mount(el, { api, state, plot, dom, param, setParam, show }) {
   /** How far the simulation went, and what it does not enforce. */
   function simulationNote(simulated, refused) {
     if (refused) return h("p", { class: "small" }, `There is no simulated response: ${refused.detail ?? refused.message}`);
+    if (!simulated) return h("p", { class: "small muted" }, "Linear: exact, without limits. The simulation with total hinge moments and the actuators' limits is under way.");
     const { outcome, reason, unenforced } = simulated.simulation;
     const ended = outcome === "completed" ? "" : ` It ended early: ${reason ?? outcome.replaceAll("_", " ")}.`;
     const open = unenforced.length ? ` Not enforced: ${unenforced.join(", ")}.` : "";
@@ -74,7 +80,7 @@ function mount(el, { api, state, plot, dom, param, setParam, show }) {
   }
 
   function drawQuantity(picture, { id, title, field, unit }, { linear, simulated, limits, range }) {
-    const style = { aileron: colour("--series-1"), tab: colour("--series-2") };
+    const style = { aileron: "--series-1", tab: "--series-2" };
     const line = (response, surface, name, dash, width) => ({ name: `${surface} ${name}`, x: response.time_s, y: series(response, surface, id), mode: "lines", line: { color: style[surface], dash, width } });
     const surfaces = ["aileron", "tab"];
     const traces = [
@@ -89,6 +95,6 @@ function mount(el, { api, state, plot, dom, param, setParam, show }) {
       margin: { l: 58, r: 12, t: 12, b: 44 },
       ...limitLines(limits, field, 2.5 * most),
     };
-    return plot.draw(picture, traces, layout, { label: `${title} of aileron and tab over the reference step, linear and simulated; the largest is ${most.toPrecision(4)} ${unit}`, height: 290 });
+    return plot.draw(picture, traces, layout, { label: `${title} of aileron and tab over the reference step, linear${simulated ? " and simulated" : ""}; the largest is ${most.toPrecision(4)} ${unit}`, height: 290 });
   }
 }

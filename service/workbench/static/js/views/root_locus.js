@@ -2,6 +2,7 @@
 
 import { drawStep } from "./live/step_plot.js";
 import { liveController } from "./live/live.js";
+import { AT_POINT } from "./live/scope.js";
 import { extentOf, locusTraces, polesAt } from "./locus_traces.js";
 import { figureTable, reasonList, verdictLine } from "./point_figures.js";
 
@@ -16,7 +17,7 @@ function mount(el, context) {
   const { h } = dom;
   const choice = h("div", { class: "row" });
   el.append(choice);
-  const live = liveController(el, context, { studies: STUDIES, query, extra, moving, onMove, onAnswer });
+  const live = liveController(el, context, { scope: AT_POINT, studies: STUDIES, query, extra, moving, onMove, onAnswer });
   const picture = h("div", {});
   const words = h("div", { class: "small" });
   const step = h("div", {});

@@ -1,34 +1,34 @@
 /**
- * A controller at a point whose gains or weights are moved: the knobs, and previews that follow them.
+ * A controller whose gains or weights are moved, at a point or over the grid: the knobs, and previews that follow them.
  * One preview is under way at a time; of the moves in the meantime the latest is asked for next. Those of a state that
  * is left are aborted.
  */
 
 import { clear, h, live as say, message } from "../../dom.js";
-import { placeOf } from "../../grid.js";
 import { knobPanel } from "./knob_panel.js";
 import { knobsOf } from "./knobs.js";
-import { narrowed, withValue } from "./narrow.js";
+import { withValue } from "./narrow.js";
 import { partOf, taken } from "./take.js";
 
 const SETTLED_MS = 300;
 
 /**
- * Knobs of the chosen controller at the chosen point.
+ * Knobs of the chosen controller.
  * @param {Element} el gets the knobs, a place for what is refused, and the body
  * @param {Object} context of the view
  * @param {Object} options
+ * @param {import("./scope.js").Scope} options.scope where it is looked at
  * @param {string[]} options.studies wanted of previews
  * @param {function(): Object} [options.query] more fields of the preview's body
  * @param {function(): import("./knobs.js").Knob[]} [options.extra] knobs that are no part of the request
  * @param {function(string): string[]} [options.moving] studies wanted while this knob moves; all of them when it rests
  * @param {function(Object<string, number>): void} [options.onMove] told at once of all values, by knob
- * @param {function({now: Object, designed: Object, problems: Object, values: Object}): void} options.onAnswer studies as moved and as designed;
- *   `problems`: why one of them is not there at all
+ * @param {function({now: Object, designed: Object, problems: Object, values: Object}): void} options.onAnswer studies as moved and as designed,
+ *   with the `design` that they are of; `problems`: why one of them is not there at all
  * @returns {{body: Element, start: function(): void, update: function(Set<string>): void, values: function(): Object<string, number>,
  *   designedValue: function(string): ?number, unmount: function(): void}} values by knob
  */
-export function liveController(el, context, { studies, query = () => ({}), extra = () => [], moving = () => studies, onMove, onAnswer }) {
+export function liveController(el, context, { scope, studies, query = () => ({}), extra = () => [], moving = () => studies, onMove, onAnswer }) {
   const { api, state } = context;
   const panel = h("div", { class: "stack" });
   const note = h("div", { class: "live-note" });
@@ -52,14 +52,14 @@ export function liveController(el, context, { studies, query = () => ({}), extra
     end();
     const signal = context.signal();
     const { design, controller: name, point } = state.get();
-    const [i, j] = placeOf(design, point);
     const designed = design.controllers.find((one) => one.name === name);
-    if (designed.outcomes[i][j] !== "ok") {
+    const missing = scope.missing(design, designed, point);
+    if (missing) {
       clear(panel);
-      refuse(designed.reasons[i][j] ?? designed.outcomes[i][j].replaceAll("_", " "));
+      refuse(missing, "empty");
       return;
     }
-    const request = narrowed(design, point, name);
+    const request = scope.request(design, designed, point);
     const knobs = [...extra(), ...knobsOf(request.controllers[0], designed)];
     const own = { signal, request, knobs, values: {}, wanted: null, busy: false, designed: null, problems: {}, timer: 0, shown: null };
     session = own;
@@ -98,12 +98,13 @@ export function liveController(el, context, { studies, query = () => ({}), extra
 
   async function post(own, request, wanted) {
     const document = { request, studies: wanted, controller: request.controllers[0].name, point: 0, ...query() };
-    return (await api.post("v1/previews", document, { signal: own.signal })).studies;
+    const answer = await api.post("v1/previews", document, { signal: own.signal });
+    return { ...answer.studies, design: answer.design };
   }
 
   /** A change of state that the view was told of. */
   function update(changed) {
-    const placed = changed.has("controller") || changed.has("point") || changed.has("design");
+    const placed = scope.of.some((key) => changed.has(key));
     if (forgetting) return undefined;
     if (placed && !changed.has("params")) forgetMoves();
     if (placed || !session) return void start();
@@ -121,7 +122,7 @@ export function liveController(el, context, { studies, query = () => ({}), extra
     const part = partOf(controller);
     own.reset = h("button", { type: "button", onclick: reset, disabled: !moved(own) }, `Back to the design's ${part}`);
     const take = h("button", { type: "button", onclick: () => takeOver(own) }, `Take these ${part}`);
-    own.panel = knobPanel(panel, own.knobs, { title: `${part === "gains" ? "Gains" : "Weights"} of ${controller.name} at this point`, onMove: (id, value) => move(own, id, value), actions: [own.reset, take] });
+    own.panel = knobPanel(panel, own.knobs, { title: `${part === "gains" ? "Gains" : "Weights"} of ${controller.name} ${scope.words}`, onMove: (id, value) => move(own, id, value), actions: [own.reset, take] });
     own.panel.show(own.values);
   }
 
@@ -195,10 +196,10 @@ export function liveController(el, context, { studies, query = () => ({}), extra
     body.classList.remove("stale");
   }
 
-  function refuse(text) {
+  function refuse(text, kind = "refused") {
     el.removeAttribute("aria-busy");
     body.hidden = true;
-    message(note, "refused", text);
+    message(note, kind, text);
   }
 
   function requestNow(own) {

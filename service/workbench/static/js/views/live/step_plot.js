@@ -26,7 +26,7 @@ export function drawStep(el, plot, { now, designed, step }) {
   const traces = [
     line(now, "da_deg", "aileron", { line: { width: 2.4 } }),
     line(now, "dt_deg", "tab", {}),
-    line(designed, "da_deg", "aileron as designed", { line: { color: "#8894a0", width: 1.4 } }),
+    line(designed, "da_deg", "aileron as designed", { line: { color: "--line-strong", width: 1.4 } }),
   ];
   const range = transient(designed, step);
   const layout = { xaxis: { title: { text: "time [s]" }, range }, yaxis: { title: { text: "deflection [deg]" }, ...clipped(now, designed) }, margin: { l: 56, r: 12, t: 12, b: 44 }, uirevision: String(range) };
