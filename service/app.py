@@ -10,12 +10,13 @@ from anyio import CapacityLimiter, Semaphore, to_thread
 from fastapi import Depends, FastAPI
 from starlette.types import ASGIApp
 
-from service import errors, openapi, pages, workbench
+from service import workbench
 from service.access.door import Door
 from service.access.exposure import keys_required
 from service.access.guard import Guard
-from service.design_examples import design_requests
 from service.designs import Designs, design_id
+from service.documentation import openapi, pages
+from service.documentation.design_examples import design_requests
 from service.examples import NAMES
 from service.housekeeping import house_kept
 from service.http.body_limit import BodyLimit
@@ -31,6 +32,7 @@ from service.settings import Settings
 from service.state import State
 from service.store.store import Store
 from service.version import release
+from service.wire import errors
 
 #: Threads for what only reads the store.
 LIGHT_THREADS = 8

@@ -27,18 +27,18 @@ from schedules.parts import Part, Synthesised, parts, synthesise
 from schedules.run import run
 from schedules.schedule import Provenance
 from schedules.study import PlantStudy, Study
-from service import study_of
 from service.access.principals import OPERATOR, Principal
-from service.answering import encode
 from service.envelopes import Envelopes
 from service.jobs.frames import cut, joined
 from service.limits import check_envelope
 from service.presenters.design import design_document
 from service.presenters.grid import grid_index
-from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound, StaleDesign, StudyNotPossible
 from service.schemas.requests import DesignRequest, LinearModelsRequest
 from service.store.designs import DesignStore, ListedDesign, StoredDesign
+from service.to_domain import study_of
 from service.version import code_version
+from service.wire.answering import encode
+from service.wire.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound, StaleDesign, StudyNotPossible
 
 #: Largest relative change of a gain between a stored design and the same design made again.
 SAME_GAINS = 1e-9

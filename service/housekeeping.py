@@ -10,9 +10,9 @@ from contextlib import asynccontextmanager, suppress
 
 from anyio import to_thread
 
-from service.refusals import StoreUnavailable
 from service.settings import Settings
 from service.store.store import Store
+from service.wire.refusals import StoreUnavailable
 
 log = logging.getLogger("gainfield")
 

@@ -14,7 +14,6 @@ from design.simulation.simulate import simulation_steps
 from design.simulation.time_grid import LARGEST_COUNT
 from model.flight import flight_grid
 from schedules.study import PlantStudy
-from service.refusals import FieldRefusal, InvalidRequest, LimitExceeded
 from service.schemas import aerodynamics, flight
 from service.schemas.actuators import Actuators
 from service.schemas.controller_requests import Controller
@@ -23,6 +22,7 @@ from service.schemas.requests import DesignRequest, LinearModelsRequest
 from service.schemas.studies import EigenvalueSweepRequest, SteadyStateMapRequest
 from service.schemas.weights import PowerWeights
 from service.settings import Settings
+from service.wire.refusals import FieldRefusal, InvalidRequest, LimitExceeded
 
 #: Limits of a server, in the order in which they are listed, with the unit of each.
 LIMITS = {

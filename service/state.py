@@ -16,10 +16,10 @@ from service.access.door import Door
 from service.access.principals import Principal
 from service.designs import Designs
 from service.metrics import Metrics
-from service.reading import prefers_async
-from service.refusals import Overloaded
 from service.settings import Settings
 from service.store.store import Store
+from service.wire.reading import prefers_async
+from service.wire.refusals import Overloaded
 
 Result = TypeVar("Result")
 

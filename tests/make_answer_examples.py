@@ -8,9 +8,9 @@ from typing import Any
 
 from fastapi.testclient import TestClient
 
-from service.answer_examples import ANSWERS, file_name, marked, trimmed
 from service.app import create_app, example_id
-from service.design_examples import design_requests
+from service.documentation.answer_examples import ANSWERS, file_name, marked, trimmed
+from service.documentation.design_examples import design_requests
 from service.examples import NAMES
 from service.jobs.example import EXAMPLE_PATH, example_body, example_job
 from service.settings import Settings

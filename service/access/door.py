@@ -13,9 +13,9 @@ from service.access.exposure import is_loopback, keys_required
 from service.access.keys import KnownKeys
 from service.access.principals import ANYBODY, OPERATOR, Principal, Scope
 from service.access.rates import Allowance, Rates
-from service.refusals import FieldRefusal, NotAllowed, QuotaExceeded, TooManyRequests, Unauthenticated
 from service.settings import Settings
 from service.store.keys import KeyStore
+from service.wire.refusals import FieldRefusal, NotAllowed, QuotaExceeded, TooManyRequests, Unauthenticated
 
 #: What everybody may read: pages, their files, and what says that and what the server is.
 OPEN = frozenset({"/", "/healthz", "/readyz", "/v1/version", "/openapi.json", "/docs", "/redoc", "/favicon.ico"})

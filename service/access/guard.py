@@ -5,8 +5,8 @@ from __future__ import annotations
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access.door import Door
-from service.errors import rate_headers, refusal_response
-from service.refusals import Refusal
+from service.wire.errors import rate_headers, refusal_response
+from service.wire.refusals import Refusal
 
 
 class Guard:

@@ -14,11 +14,11 @@ from schedules.schedule import GainSchedule, Provenance
 from schedules.schedule_of import schedule_of
 from service.cli.progress import Reached
 from service.designs import design_id, parts_of, stored_design, synthesised
-from service.errors import MAX_FIELDS
-from service.pointers import field_refusal
-from service.refusals import InvalidRequest
 from service.schemas.requests import DesignRequest
 from service.store.designs import StoredDesign
+from service.wire.errors import MAX_FIELDS
+from service.wire.pointers import field_refusal
+from service.wire.refusals import InvalidRequest
 
 
 @dataclass(frozen=True, eq=False)

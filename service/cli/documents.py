@@ -23,8 +23,8 @@ def read_document(path: Path) -> dict[str, Any]:
     OSError : it cannot be read
     Refused : it holds no JSON object
     """
-    from service.reading import read_json
-    from service.refusals import UnreadableBody
+    from service.wire.reading import read_json
+    from service.wire.refusals import UnreadableBody
 
     content = sys.stdin.buffer.read() if path == STDIN else path.read_bytes()
     name = "standard input" if path == STDIN else str(path)

@@ -9,7 +9,7 @@ from typing import Any
 
 import typer
 
-from service.refusals import Refusal
+from service.wire.refusals import Refusal
 
 REFUSED = 1
 
@@ -71,7 +71,7 @@ def tell(problem: Mapping[str, Any], as_json: bool) -> None:
 
 
 def _of_the_service(refusal: Refusal) -> dict[str, Any]:
-    from service.errors import STATUS, problem
+    from service.wire.errors import STATUS, problem
 
     return Refused.of(problem(*STATUS[type(refusal)], refusal.detail, refusal.fields)).document
 

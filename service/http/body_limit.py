@@ -5,8 +5,8 @@ from __future__ import annotations
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.errors import refusal_response
-from service.refusals import BodyTooLarge, FieldRefusal
+from service.wire.errors import refusal_response
+from service.wire.refusals import BodyTooLarge, FieldRefusal
 
 #: How many bytes beyond the limit are read and dropped, so that a client still sending sees the answer.
 DRAIN = 8

@@ -19,8 +19,8 @@ from uvicorn.config import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
-from service.errors import MEDIA_TYPE, problem
 from service.settings import Settings
+from service.wire.errors import MEDIA_TYPE, problem
 
 #: What a client does not do in time, or cannot do: status -> code, detail.
 _REFUSED = {

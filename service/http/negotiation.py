@@ -8,7 +8,7 @@ from fastapi import Request
 from fastapi.datastructures import DefaultPlaceholder
 from fastapi.routing import APIRoute
 
-from service.refusals import FieldRefusal, NotAcceptable
+from service.wire.refusals import FieldRefusal, NotAcceptable
 
 JSON = "application/json"
 JSON_LINES = "application/jsonl"

@@ -13,9 +13,9 @@ from anyio import CancelScope, to_thread
 from fastapi import Request, Response
 
 from service.access.principals import Principal
-from service.refusals import FieldRefusal, RepeatedDifferently, RepeatedTooSoon, StoreUnavailable, TooManyRequests
 from service.settings import Settings
 from service.store.repeated import LOST_AFTER, KeptAnswer, RepeatedStore
+from service.wire.refusals import FieldRefusal, RepeatedDifferently, RepeatedTooSoon, StoreUnavailable, TooManyRequests
 
 HEADER = "Idempotency-Key"
 LONGEST_KEY = 200

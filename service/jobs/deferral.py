@@ -15,18 +15,18 @@ from fastapi import APIRouter, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 
-from service.answering import JSON
+from service.documentation.openapi import job_answers
 from service.jobs.document import job_document
 from service.jobs.jobs import RETRY_AFTER
 from service.jobs.kinds.answer import answer_job, asked
 from service.limits import LIMITS, fits_in_a_job, of_jobs
-from service.openapi import job_answers
-from service.reading import JsonRequest, prefers_async
-from service.refusals import LimitExceeded, NotFound
 from service.state import ALWAYS_HEAVY, HEAVY, State, principal_of, state_of
 from service.store.designs import StoredDesign
 from service.store.jobs import Job
 from service.version import code_version
+from service.wire.answering import JSON
+from service.wire.reading import JsonRequest, prefers_async
+from service.wire.refusals import LimitExceeded, NotFound
 
 
 def deferrable(router: APIRouter) -> APIRouter:

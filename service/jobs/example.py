@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from service.body_examples import BODIES
+from service.documentation.body_examples import BODIES
 from service.jobs.deferral import answer_id
 from service.store.designs import LOCAL
 

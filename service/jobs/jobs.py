@@ -8,10 +8,10 @@ from service.jobs.dask_cluster import check_address
 from service.jobs.executors import executor
 from service.jobs.runner import Runner
 from service.limits import setting_of
-from service.refusals import FieldRefusal, NotFound, QueueFull
 from service.settings import Settings
 from service.store.jobs import Job, NewJob
 from service.store.store import Store
+from service.wire.refusals import FieldRefusal, NotFound, QueueFull
 
 #: How long a client may wait before it asks again for a job, or for room in the queue [s].
 RETRY_AFTER = 1

@@ -14,15 +14,15 @@ from threading import Event, Thread
 
 import orjson
 
-from service.errors import problem
 from service.jobs.executors import Executor
 from service.jobs.outcome import Outcome
 from service.jobs.running import RunningJob
 from service.jobs.turns import Turns
-from service.refusals import StoreUnavailable
 from service.store.jobs import Job, JobStore
 from service.store.store import Store
 from service.version import code_version
+from service.wire.errors import problem
+from service.wire.refusals import StoreUnavailable
 
 #: Name of the lease.
 ROLE = "runner"

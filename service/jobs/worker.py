@@ -7,12 +7,12 @@ from typing import Any
 
 import orjson
 
-from service.errors import STATUS, problem
 from service.jobs.kinds.kind import TaskFailed
 from service.jobs.kinds.kinds import KINDS
 from service.jobs.outcome import Outcome
-from service.refusals import Refusal
 from service.version import code_version
+from service.wire.errors import STATUS, problem
+from service.wire.refusals import Refusal
 
 log = logging.getLogger("gainfield")
 

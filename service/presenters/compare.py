@@ -10,8 +10,8 @@ import numpy as np
 from model.arrays import FloatArray
 from schedules.compare import Carried, CommonPoints, Compared, figures
 from service.presenters.grid import coordinates, grid_index
-from service.request_differences import MOST_LISTED, Difference
-from service.spec_names import spec_field
+from service.wire.request_differences import MOST_LISTED, Difference
+from service.wire.spec_names import spec_field
 
 
 @dataclass(frozen=True)

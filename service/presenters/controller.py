@@ -17,7 +17,7 @@ from service.presenters.infeasibility import infeasibility_document
 from service.presenters.margins import margins_document
 from service.presenters.reasons import reasons
 from service.presenters.riccati import riccati_document
-from service.spec_names import spec_field
+from service.wire.spec_names import spec_field
 
 NO_METRIC = {
     "rise_time_s": "90 % of the change is not reached within the time the response is followed",

@@ -16,7 +16,7 @@ from schedules.judging import horizon
 from schedules.robust_performance import Quantity
 from service.presenters.grid import grid_document, outcome_documents
 from service.presenters.requirements import reference_document
-from service.spec_names import spec_field
+from service.wire.spec_names import spec_field
 
 #: Field on the wire -> attribute of `FlownFigures`, what one unit of it is on the wire, and the wire's unit.
 FIGURES: dict[str, tuple[Quantity, float, str]] = {

@@ -14,8 +14,8 @@ from schedules.files import FILE_FORMATS
 from service.presenters.gain_tables import gain_document, smoothing_document
 from service.presenters.grid import air_document, grid_document, outcome_documents, warning_documents
 from service.presenters.hinge_moments import fit_document
-from service.spec_names import SpecField, spec_field
 from service.version import code_version, solver
+from service.wire.spec_names import SpecField, spec_field
 
 
 def design_document(ident: str, request: dict[str, Any], created_at: str, envelope: DesignedEnvelope) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from design.classical.synthesis import DesignMargins
 from schedules.designed import DesignedEnvelope
 from service.presenters.gain_tables import gain_document
 from service.presenters.grid import grid_document, outcome_documents
-from service.spec_names import spec_field
+from service.wire.spec_names import spec_field
 
 
 def design_margin_document(

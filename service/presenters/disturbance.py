@@ -8,7 +8,7 @@ import numpy as np
 
 from design.disturbance.assessment import Disturbance, assess_disturbances
 from design.loop import Loop
-from service.signal_units import command_signals, ratio_unit, signal_unit
+from service.wire.signal_units import command_signals, ratio_unit, signal_unit
 
 
 def disturbance_documents(loop: Loop) -> list[dict[str, Any]]:

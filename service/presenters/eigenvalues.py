@@ -11,7 +11,7 @@ from model.eigenvalue_sweep import EigenvalueSweep, SweptModes
 from model.flutter import FlutterCriterion, Mechanism
 from service.presenters.grid import air_document, coordinates, grid_document, grid_index
 from service.presenters.hinge_moments import fit_document
-from service.sweeps import Swept
+from service.studies.sweeps import Swept
 
 
 def sweep_document(swept: Swept) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from design.lqr.torque_loop import lqr_loop
 from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.state_feedback import noise_of
 from service.presenters.margins import margins_document
-from service.signal_units import command_signals, signal_unit
+from service.wire.signal_units import command_signals, signal_unit
 
 #: Errors of the angles that only say that they are measured: figures of noise are not told of them.
 _NO_NOISE = NoiseModel(0.0, 0.0, 1.0, 1.0)

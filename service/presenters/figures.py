@@ -9,10 +9,10 @@ import numpy as np
 from design.assess import Assessment
 from model.arrays import ComplexArray, FloatArray
 from schedules.designed import DesignedController, DesignedEnvelope
-from service.answering import complex_numbers
 from service.presenters.controller import NO_METRIC, step_figures
 from service.presenters.grid import grid_document, outcome_documents
 from service.presenters.margins import NO_MARGIN, margin_figures
+from service.wire.answering import complex_numbers
 
 #: What a null at a point that carries a design means.
 _NULLS = {

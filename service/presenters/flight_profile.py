@@ -16,7 +16,7 @@ from schedules.rules import INTERPOLATIONS, OUTS_OF_RANGE
 from schedules.wire_names import wire_name
 from service.presenters.simulation import LIMITED
 from service.schemas.flight_profiles import FlightProfileRequest
-from service.signal_units import signal_unit
+from service.wire.signal_units import signal_unit
 
 _SURFACES = ("tab", "aileron")
 #: Quantity of a figure -> the ending of its name, and how many of that unit make one inside.

@@ -13,7 +13,7 @@ from design.loop import Loop
 from design.lqr.coded_loop import CodedLoop
 from design.lqr.coded_responses import coded_responses
 from model.arrays import FloatArray
-from service.signal_units import command_signals, ratio_unit, signal_unit
+from service.wire.signal_units import command_signals, ratio_unit, signal_unit
 
 #: What is seen of a disturbance, besides the commands.
 _OUTPUTS = ("da", "dt", "da_rate", "dt_rate")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from design.classical.infeasibility import Infeasibility
-from service.spec_names import spec_field
+from service.wire.spec_names import spec_field
 
 
 def infeasibility_document(found: Infeasibility) -> dict[str, Any]:

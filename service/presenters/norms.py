@@ -10,7 +10,7 @@ from design.disturbance.closed_system import ClosedSystem, closed_system
 from design.disturbance.h2 import h2_norm
 from design.disturbance.h_infinity import h_infinity_norm
 from design.loop import Loop
-from service.signal_units import command_signals, ratio_unit, signal_unit
+from service.wire.signal_units import command_signals, ratio_unit, signal_unit
 
 _ANGLES = ("da", "dt")
 

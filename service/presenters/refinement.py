@@ -11,7 +11,7 @@ from schedules.refine.result import RefinedSchedule
 from schedules.wire_names import axis_name
 from service.presenters.gain_tables import gain_document
 from service.presenters.grid import grid_document
-from service.spec_names import spec_field
+from service.wire.spec_names import spec_field
 
 
 def refinement_document(found: RefinedSchedule) -> dict[str, Any]:

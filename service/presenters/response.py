@@ -12,7 +12,7 @@ from design.response.step_response import Response
 from design.simulation.response import NonlinearResponse
 from model.arrays import FloatArray
 from schedules.wire_names import wire_name
-from service.signal_units import signal_unit
+from service.wire.signal_units import signal_unit
 
 
 def response_document(response: Response | ManoeuvreResponse | NonlinearResponse) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 from design.lqr.sample_time_sweep import SampleTimeSweep, SweptWay
 from design.lqr.sample_time_trials import SampleTimeTrials
 from design.specs import QUANTITIES, Spec
-from service.spec_names import SpecField, spec_field
+from service.wire.spec_names import SpecField, spec_field
 
 #: Figures that are no quantity of a spec have no unit.
 _RADIUS = "spectral_radius"

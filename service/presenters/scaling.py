@@ -12,7 +12,7 @@ from schedules.power_laws import VARIABLE_UNITS, GainLaw
 from schedules.scaling_laws import ScalingLoss, SpecLoss, scaling_law
 from service.presenters.gain_tables import gain_document
 from service.presenters.grid import grid_document, outcome_documents
-from service.spec_names import spec_field
+from service.wire.spec_names import spec_field
 
 
 def scaling_document(envelope: DesignedEnvelope, controller: DesignedController) -> dict[str, Any]:

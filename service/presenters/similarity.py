@@ -6,7 +6,6 @@ from typing import Any
 
 from model.servo_scaling import ScaledServo
 from model.similarity import PressureSchedule, ServoExponents
-from service.plant_studies import Similarity
 from service.presenters.grid import (
     air_document,
     coordinates,
@@ -16,6 +15,7 @@ from service.presenters.grid import (
     warning_documents,
 )
 from service.presenters.hinge_moments import fit_document
+from service.studies.plant import Similarity
 
 
 def similarity_document(found: Similarity) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 from design.gains import Gain
 from design.simulation.anti_windup import INTEGRALS
 from design.simulation.response import NonlinearResponse
-from service.signal_units import command_signals, signal_unit
+from service.wire.signal_units import command_signals, signal_unit
 
 #: Limits in the order of `NonlinearResponse.at_limit`.
 LIMITED = ("deflection", "rate", "torque", "power")

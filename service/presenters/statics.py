@@ -10,7 +10,6 @@ from model.arrays import FloatArray
 from model.reachable import RangeEnd, ReachableAileron
 from model.steady_state import DeflectionMap, FloatLine, SteadyStateMap, TabOnlyEquilibrium
 from model.trim import Trim
-from service.plant_studies import SteadyStates
 from service.presenters.grid import (
     air_document,
     coordinates,
@@ -21,6 +20,7 @@ from service.presenters.grid import (
 )
 from service.presenters.hinge_moments import fit_document
 from service.presenters.plant import trim_document
+from service.studies.plant import SteadyStates
 
 _STATICS = (
     "trim",

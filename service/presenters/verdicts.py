@@ -11,7 +11,7 @@ from model.arrays import ObjectArray
 from schedules.designed import DesignedController, DesignedEnvelope
 from service.presenters.design import verdict_over_grid
 from service.presenters.grid import grid_document, outcome_documents
-from service.spec_names import spec_field
+from service.wire.spec_names import spec_field
 
 
 def verdicts_document(envelope: DesignedEnvelope, controller: DesignedController) -> dict[str, Any]:

@@ -16,8 +16,8 @@ from model.arrays import FloatArray
 from model.flight import FlightGrid
 from service.presenters.grid import coordinates, grid_document, grid_index
 from service.presenters.infeasibility import infeasibility_document
-from service.spec_names import spec_field
-from service.weight_search_of import WIRE_NAMES, SoughtWeights
+from service.to_domain.weight_search_of import WIRE_NAMES, SoughtWeights
+from service.wire.spec_names import spec_field
 
 #: Values of the specs (*G, s), and what is minimised (*G,), with the controller's own weights.
 Figures = tuple[FloatArray, FloatArray]

@@ -18,7 +18,7 @@ from model.arrays import BoolArray, FloatArray, ObjectArray
 from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.wire_names import wire_name
 from service.presenters.grid import grid_document, outcome_documents
-from service.worst_case_of import Admissible, signal_size
+from service.to_domain.worst_case_of import Admissible, signal_size
 
 _NO_DESIGN = "the controller has no gains there"
 _JUMPS = "unlimited: the signal takes the rate of a reference that may jump; a limit of the rate bounds it"

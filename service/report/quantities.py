@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from service.units import unit_of, without_unit
+from service.wire.units import unit_of, without_unit
 
 #: For what does not exist.
 NONE = "—"

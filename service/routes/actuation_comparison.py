@@ -17,10 +17,8 @@ from schedules.actuation_comparison import (
     why_not_compared,
 )
 from schedules.designed import DesignedEnvelope
-from service.answering import answer, encode
+from service.documentation.openapi import problems
 from service.limits import check_size
-from service.lqr_studies import refused_by_the_domain
-from service.openapi import problems
 from service.presenters.actuation_comparison import compared_document, comparison_document, left_out_document
 from service.routes.designs import DesignId
 from service.schemas.actuation_answers import ActuationComparison
@@ -28,6 +26,8 @@ from service.schemas.manoeuvres import RateLimit
 from service.schemas.wire import PARAMETERS
 from service.settings import Settings
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import refused_by_the_domain
+from service.wire.answering import answer, encode
 
 router = APIRouter(prefix="/v1/designs/{id}/actuation-comparison", tags=["designs"])
 

@@ -12,22 +12,22 @@ from schedules.designed import DesignedController
 from schedules.inverse_sizing import inverse_sizing
 from schedules.slower_tab_only import HALVINGS
 from schedules.surface_requirement import Sized
-from service import study_of
-from service.actuator_sizing_of import candidate, sized
-from service.answering import answer, encode
 from service.designs import continuous_loop, controller_of
+from service.documentation.openapi import BODY, problems
 from service.limits import check_manoeuvre, check_size
-from service.lqr_studies import refused_by_the_domain
-from service.openapi import BODY, problems
 from service.presenters.actuator_sizing import inverse_document, selection_document
-from service.reading import JsonRoute
-from service.refusals import FieldRefusal, InvalidRequest, StudyNotPossible
 from service.routes.controllers import ControllerName
 from service.routes.designs import DesignId
 from service.schemas import actuator_sizing as asked
 from service.schemas.actuator_sizing_answers import ActuatorSelection, InverseSizing
 from service.settings import Settings
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import refused_by_the_domain
+from service.to_domain import study_of
+from service.to_domain.actuator_sizing_of import candidate, sized
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
+from service.wire.refusals import FieldRefusal, InvalidRequest, StudyNotPossible
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}", tags=["controllers"], route_class=JsonRoute)
 

@@ -9,11 +9,11 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, Field
 
 from model.atmosphere import standard_atmosphere
-from service.answering import answer, encode
-from service.openapi import problems
+from service.documentation.openapi import problems
 from service.schemas.air import Air
 from service.schemas.flight import Altitude, TemperatureOffset
 from service.schemas.wire import PARAMETERS
+from service.wire.answering import answer, encode
 
 router = APIRouter(prefix="/v1/atmosphere", tags=["air"])
 

@@ -12,16 +12,16 @@ from pydantic import BaseModel, Field
 from model.arrays import IntArray
 from schedules.analysis import PlantEnvelope
 from schedules.compare import Compared, carried, common_points
-from service.answering import answer, encode
 from service.designs import Designs, controller_of
+from service.documentation.openapi import problems
 from service.limits import check_size
-from service.openapi import problems
 from service.presenters.compare import Flown, compare_document
-from service.request_differences import differences
 from service.routes.designs import DesignId
 from service.schemas.compare_answers import Comparison
 from service.schemas.wire import PARAMETERS
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.wire.answering import answer, encode
+from service.wire.request_differences import differences
 
 router = APIRouter(prefix="/v1/designs/{id}/compare", tags=["designs"])
 

@@ -15,21 +15,21 @@ from schedules.run import design_margins
 from schedules.schedule import GainSchedule
 from schedules.schedule_of import schedule_of
 from schedules.wire_names import axis_name
-from service.answering import answer, encode
 from service.designs import controller_of, measuring_all
-from service.openapi import problems
+from service.documentation.openapi import problems
 from service.presenters.design_margin import design_margin_document
 from service.presenters.figures import figures_document
 from service.presenters.gains import gains_document
 from service.presenters.scaling import scaling_document
 from service.presenters.verdicts import verdicts_document
-from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.designs import DesignId
 from service.schemas.controller_answers import DesignMargin, Figures, InterpolatedGains, Verdicts
 from service.schemas.scaling_answers import Scaling
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere
-from service.units import unit_of
+from service.wire.answering import answer, encode
+from service.wire.refusals import FieldRefusal, InvalidRequest
+from service.wire.units import unit_of
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}", tags=["controllers"])
 

@@ -9,17 +9,17 @@ from pydantic import BaseModel, Field
 
 from schedules.cross_check import cross_check
 from schedules.designed import DesignedController, DesignedEnvelope
-from service.answering import answer, encode
 from service.designs import controller_of
+from service.documentation.openapi import problems
 from service.limits import check_size
-from service.openapi import problems
 from service.presenters.cross_check import CheckedHere, cross_check_document
 from service.presenters.grid import grid_index
-from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.designs import DesignId
 from service.schemas.cross_check_answers import CrossCheck
 from service.schemas.wire import PARAMETERS
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.wire.answering import answer, encode
+from service.wire.refusals import FieldRefusal, InvalidRequest
 
 router = APIRouter(prefix="/v1/designs/{id}/cross-check", tags=["designs"])
 

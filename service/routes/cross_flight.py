@@ -7,14 +7,14 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from schedules.cross_flight import cross_flight
-from service.answering import answer, encode
-from service.flown_away import Flown, carried_controller, check_loops, flown, flown_specs
-from service.openapi import problems
+from service.documentation.openapi import problems
 from service.presenters.cross_flight import cross_flight_document
 from service.routes.controllers import ControllerName
 from service.routes.designs import DesignId
 from service.schemas.robustness_answers import CrossFlight
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.studies.flown_away import Flown, carried_controller, check_loops, flown, flown_specs
+from service.wire.answering import answer, encode
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/cross-flight", tags=["controllers"])
 

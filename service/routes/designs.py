@@ -8,20 +8,20 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from service.answering import answer, encode, line
 from service.designs import design_id
+from service.documentation.openapi import BODY, job_answers, problems
 from service.http.negotiation import JSON, JSON_LINES, accepted_by, preferred
 from service.jobs.deferral import accepted
 from service.jobs.kinds.design import design_job
 from service.limits import check_design, check_size, fits_in_a_job, of_jobs
-from service.openapi import BODY, job_answers, problems
-from service.reading import JsonRoute, prefers_async
-from service.refusals import LimitExceeded
 from service.schemas.design import Design, DesignList
 from service.schemas.requests import DesignRequest
 from service.schemas.wire import PARAMETERS
 from service.settings import Settings
 from service.state import HEAVY, DesignsHere, SettingsHere, principal_of, read, state_of
+from service.wire.answering import answer, encode, line
+from service.wire.reading import JsonRoute, prefers_async
+from service.wire.refusals import LimitExceeded
 
 router = APIRouter(prefix="/v1/designs", tags=["designs"], route_class=JsonRoute)
 

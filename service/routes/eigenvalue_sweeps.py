@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from service.answering import answer, encode
+from service.documentation.openapi import BODY, problems
 from service.limits import check_sweep
-from service.openapi import BODY, problems
 from service.presenters.eigenvalues import sweep_document
-from service.reading import JsonRoute
 from service.schemas.eigenvalues import EigenvalueSweeps
 from service.schemas.studies import EigenvalueSweepRequest
 from service.state import HEAVY, SettingsHere
-from service.sweeps import refits, swept
+from service.studies.sweeps import refits, swept
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
 
 router = APIRouter(prefix="/v1/eigenvalue-sweeps", tags=["model"], route_class=JsonRoute)
 

@@ -6,11 +6,11 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
 
-from service.answering import answer, encode
+from service.documentation.openapi import problems
 from service.examples import NAMES, example
-from service.openapi import problems
-from service.refusals import NotFound
 from service.schemas.requests import DesignRequest
+from service.wire.answering import answer, encode
+from service.wire.refusals import NotFound
 
 router = APIRouter(prefix="/v1/examples", tags=["examples"])
 

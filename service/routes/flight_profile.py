@@ -13,19 +13,19 @@ from schedules.profile import FlightProfile, ProfileRefused
 from schedules.profile_response import ProfileRequest
 from schedules.study import Study
 from schedules.wire_names import wire_name
-from service.answering import answer, encode
 from service.designs import continuous_loop, controller_of
+from service.documentation.openapi import BODY, problems
 from service.limits import check_size
-from service.lqr_studies import refused_by_the_domain
-from service.manoeuvre_of import manoeuvre_of
-from service.openapi import BODY, problems
 from service.presenters.flight_profile import flight_profile_document
-from service.reading import JsonRoute
-from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.controllers import ControllerName
 from service.routes.designs import DesignId
 from service.schemas.flight_profiles import FlightProfileRequest, FlownProfile, Profile
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import refused_by_the_domain
+from service.to_domain.manoeuvre_of import manoeuvre_of
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
+from service.wire.refusals import FieldRefusal, InvalidRequest
 
 _SPEEDS: dict[str, SpeedAxis] = {wire_name(name, SPEED_UNITS[name]): name for name in get_args(SpeedAxis)}
 

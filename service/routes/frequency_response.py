@@ -14,18 +14,18 @@ from design.frequency.sampled import sampled_poles
 from design.lqr.coded_loop import CodedLoop
 from model.arrays import ComplexArray
 from schedules.designed import DesignedEnvelope
-from service.answering import answer, encode
 from service.designs import controller_of, point_with_gains
+from service.documentation.openapi import problems
 from service.limits import check_size
-from service.openapi import problems
 from service.presenters.frequency_response import coded_responses_document, frequency_response_document
-from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.controllers import ControllerName, Point
 from service.routes.designs import DesignId
 from service.schemas.frequency_answers import FrequencyResponses
 from service.schemas.wire import PARAMETERS
 from service.settings import Settings
 from service.state import HEAVY, DesignsHere, SettingsHere
+from service.wire.answering import answer, encode
+from service.wire.refusals import FieldRefusal, InvalidRequest
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/frequency-response", tags=["controllers"])
 

@@ -11,16 +11,16 @@ from schedules.hidden_coupling import hidden_coupling
 from schedules.moving_loop import why_no_coupling
 from schedules.rules import Interpolation, OutOfRange, ScheduleRules
 from schedules.schedule_of import schedule_of
-from service.answering import answer, encode
 from service.designs import controller_of, point_with_gains
-from service.openapi import problems
+from service.documentation.openapi import problems
 from service.presenters.hidden_coupling import hidden_coupling_document
-from service.refusals import StudyNotPossible
 from service.routes.controllers import ControllerName
 from service.routes.designs import DesignId
 from service.schemas.hidden_coupling_answers import HiddenCoupling
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere
+from service.wire.answering import answer, encode
+from service.wire.refusals import StudyNotPossible
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/hidden-coupling", tags=["controllers"])
 

@@ -11,15 +11,15 @@ from fastapi import APIRouter, Request, Response
 from model.arrays import FloatArray
 from model.hinge_moments.expansion import Angles, HingeMomentSource
 from model.hinge_moments.thin_aerofoil import ThinAerofoil
-from service.answering import answer, encode
+from service.documentation.openapi import BODY, problems
 from service.limits import check_table
-from service.openapi import BODY, problems
 from service.presenters.hinge_moments import derivatives, fit_document
-from service.reading import JsonRoute
 from service.schemas.hinge_moments import HingeMoments
 from service.schemas.requests import HingeMomentsRequest
-from service.source_of import hinge_moment_source
 from service.state import HEAVY, SettingsHere
+from service.to_domain.source_of import hinge_moment_source
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
 
 router = APIRouter(prefix="/v1/hinge-moments", tags=["model"], route_class=JsonRoute)
 

@@ -11,17 +11,17 @@ from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 
-from service.answering import JSON, answer, encode
+from service.documentation.openapi import problems
 from service.jobs.document import job_document
 from service.jobs.jobs import RETRY_AFTER, Jobs
 from service.jobs.kinds.answer import kept_answer
 from service.limits import check_size
-from service.openapi import problems
-from service.refusals import NoResult, NotFound
 from service.schemas.jobs import Job, JobList
 from service.schemas.wire import PARAMETERS
 from service.state import SettingsHere, principal_of, state_of
 from service.store.jobs import Job as StoredJob
+from service.wire.answering import JSON, answer, encode
+from service.wire.refusals import NoResult, NotFound
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 

@@ -9,17 +9,17 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, Field
 
 from schedules.limited_tab import limited_tab, limited_tab_request
-from service.answering import answer, encode
 from service.designs import continuous_loop, controller_of
+from service.documentation.openapi import problems
 from service.limits import check_steps
-from service.lqr_studies import refused_by_the_domain
-from service.openapi import problems
 from service.presenters.limited_tab import limited_tab_document
 from service.routes.controllers import ControllerName
 from service.routes.designs import DesignId
 from service.schemas.limited_tab_answers import LimitedTab
 from service.schemas.wire import PARAMETERS
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import refused_by_the_domain
+from service.wire.answering import answer, encode
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/limited-tab", tags=["controllers"])
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from service.answering import answer, encode
 from service.designs import analysed
+from service.documentation.openapi import BODY, problems
 from service.limits import check_plant
-from service.openapi import BODY, problems
 from service.presenters.grid import air_document, grid_document, outcome_documents, warning_documents
 from service.presenters.hinge_moments import fit_document
 from service.presenters.plant import plant_document
-from service.reading import JsonRoute
 from service.schemas.point import LinearModels
 from service.schemas.requests import LinearModelsRequest
 from service.state import HEAVY, SettingsHere
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
 
 router = APIRouter(prefix="/v1/linear-models", tags=["model"], route_class=JsonRoute)
 

@@ -6,12 +6,12 @@ import platform
 
 from fastapi import APIRouter, Request, Response
 
-from service.answering import answer, encode
+from service.documentation.openapi import problems
 from service.limits import listed
-from service.openapi import problems
 from service.schemas.meta import Limits, Version
 from service.state import SettingsHere
 from service.version import code_version, release, solver
+from service.wire.answering import answer, encode
 
 router = APIRouter(tags=["server"])
 

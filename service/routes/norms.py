@@ -7,16 +7,16 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel
 
-from service.answering import answer, encode
 from service.designs import point_with_gains
-from service.lqr_studies import LqrName, refused_by_the_domain, state_feedback
-from service.openapi import problems
+from service.documentation.openapi import problems
 from service.presenters.norms import norms_document
 from service.routes.controllers import Point
 from service.routes.designs import DesignId
 from service.schemas.lqr_robustness import Norms
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere
+from service.studies.state_feedback import LqrName, refused_by_the_domain, state_feedback
+from service.wire.answering import answer, encode
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/norms", tags=["controllers"])
 

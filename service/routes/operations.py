@@ -9,14 +9,14 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from service.answering import answer, encode
+from service.documentation.openapi import problems
 from service.metrics import CONTENT_TYPE
-from service.openapi import problems
-from service.refusals import FieldRefusal, NotReady, StoreUnavailable
 from service.schemas.meta import Health, Readiness
 from service.state import State, read, state_of
 from service.store.figures import figures
 from service.store.migrate import version_here, version_of
+from service.wire.answering import answer, encode
+from service.wire.refusals import FieldRefusal, NotReady, StoreUnavailable
 
 router = APIRouter(tags=["server"])
 

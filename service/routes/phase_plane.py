@@ -11,19 +11,19 @@ from pydantic import BaseModel, Field
 from design.loop import Loop
 from design.lqr.phase_plane import free_trajectory, step_trajectory
 from model.arrays import FloatArray
-from service.answering import answer, encode
 from service.designs import point_with_gains
+from service.documentation.openapi import problems
 from service.limits import check_size
-from service.lqr_studies import LqrName, refused_by_the_domain, state_feedback
-from service.openapi import problems
 from service.presenters.phase_plane import free_documents, trajectory_document
 from service.presenters.requirements import reference_document
-from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.controllers import Point
 from service.routes.designs import DesignId
 from service.schemas import lqr_studies
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import LqrName, refused_by_the_domain, state_feedback
+from service.wire.answering import answer, encode
+from service.wire.refusals import FieldRefusal, InvalidRequest
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/phase-plane", tags=["controllers"])
 

@@ -10,17 +10,17 @@ from fastapi.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
 from schedules.designed import DesignedEnvelope
-from service.answering import answer, encode, line, unchanged
+from service.documentation.openapi import problems
 from service.http.negotiation import JSON_LINES
-from service.openapi import problems
 from service.presenters.controller import controller_document
 from service.presenters.grid import grid_index
 from service.presenters.plant import plant_document
-from service.refusals import NotFound
 from service.routes.designs import DesignId
 from service.schemas.point import Point
 from service.state import HEAVY, DesignsHere, computing
 from service.version import code_version
+from service.wire.answering import answer, encode, line, unchanged
+from service.wire.refusals import NotFound
 
 router = APIRouter(prefix="/v1/designs/{id}/points", tags=["designs"])
 

@@ -12,19 +12,19 @@ from pydantic import BaseModel, Field
 from design.lqr.controller import LqrController
 from design.lqr.power_comparison import PowerComparison, power_comparison
 from design.lqr.power_weights import NetWorkWeights, PowerBalancedWeights, ReferenceStep
-from service.answering import answer, encode
 from service.designs import point_with_gains
+from service.documentation.openapi import problems, shown_with
 from service.limits import check_size
-from service.lqr_studies import PowerName, StateFeedback, refused_by_the_domain, state_feedback
-from service.openapi import problems, shown_with
 from service.presenters.grid import grid_document
 from service.presenters.power_comparison import comparison_document, traces_document
 from service.presenters.requirements import reference_document
-from service.refusals import NoDesignAtPoint, StudyNotPossible
 from service.routes.designs import DesignId
 from service.schemas import lqr_studies
 from service.schemas.wire import PARAMETERS
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import PowerName, StateFeedback, refused_by_the_domain, state_feedback
+from service.wire.answering import answer, encode
+from service.wire.refusals import NoDesignAtPoint, StudyNotPossible
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/power-comparison", tags=["controllers"])
 

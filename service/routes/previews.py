@@ -10,14 +10,11 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from schedules.designed import DesignedEnvelope
-from service.answering import answer, encode
 from service.designs import controller_of, designed
+from service.documentation.openapi import BODY, problems
 from service.limits import check_design
-from service.openapi import BODY, problems
 from service.presenters.design import over_the_grid
 from service.presenters.requirements import requirements_document
-from service.reading import JsonRoute
-from service.refusals import InvalidRequest, LimitExceeded
 from service.routes.frequency_response import WantedResponses, frequency_responses_at
 from service.routes.points import point_document
 from service.routes.requirements import WantedResponse, response_at
@@ -25,6 +22,9 @@ from service.routes.root_locus import WantedLocus, root_locus_at
 from service.schemas.previews import Preview, PreviewRequest, PreviewStudies
 from service.settings import Settings
 from service.state import ALWAYS_HEAVY, SettingsHere
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
+from service.wire.refusals import InvalidRequest, LimitExceeded
 
 router = APIRouter(prefix="/v1/previews", tags=["designs"], route_class=JsonRoute)
 

@@ -7,18 +7,18 @@ from fastapi import APIRouter, Request, Response
 from schedules.designed import ControllerRefused
 from schedules.refine.refine import refine
 from schedules.refine.request import RefineRequest
-from service.answering import answer, encode
 from service.designs import controller_of
+from service.documentation.openapi import BODY, problems
 from service.limits import check_size
-from service.lqr_studies import refused_by_the_domain
-from service.openapi import BODY, problems
 from service.presenters.refinement import refinement_document
-from service.reading import JsonRoute
-from service.refusals import StudyNotPossible
 from service.routes.controllers import ControllerName
 from service.routes.designs import DesignId
 from service.schemas.refinements import Refinement, RefinementRequest
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import refused_by_the_domain
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
+from service.wire.refusals import StudyNotPossible
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/refinement", tags=["controllers"], route_class=JsonRoute)
 

@@ -8,9 +8,8 @@ import orjson
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from service.answering import answer, encode
 from service.designs import controller_of
-from service.openapi import problems
+from service.documentation.openapi import problems
 from service.presenters.figures import figures_document
 from service.presenters.requirements import requirements_document
 from service.presenters.verification import verification_document
@@ -19,7 +18,8 @@ from service.routes.designs import DesignId
 from service.schemas.verification_requests import VerificationQuery
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere, SettingsHere
-from service.verification_of import check_work, proof_request, verified
+from service.to_domain.verification_of import check_work, proof_request, verified
+from service.wire.answering import answer, encode
 
 router = APIRouter(prefix="/v1/designs/{id}/report", tags=["designs"])
 

@@ -20,16 +20,12 @@ from design.simulation.simulate import simulate
 from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.requirements import requirements, simulated
 from schedules.study import Reference
-from service.answering import answer, encode
 from service.designs import continuous_loop, controller_of, point_with_gains
+from service.documentation.openapi import BODY, problems
 from service.limits import check_manoeuvre, check_size, check_steps
-from service.lqr_studies import refused_by_the_domain
-from service.manoeuvre_of import manoeuvre_of, simulation_of
-from service.openapi import BODY, problems
 from service.presenters.requirements import flown_requirements_document, reference_document, requirements_document
 from service.presenters.response import response_document, sampled_response_document
 from service.presenters.simulation import simulation_document
-from service.reading import JsonRoute
 from service.routes.controllers import ControllerName, Point
 from service.routes.designs import DesignId
 from service.schemas import requirement_answers as answers
@@ -37,6 +33,10 @@ from service.schemas.requirement_requests import Nonlinear, RequirementsRequest,
 from service.schemas.wire import PARAMETERS
 from service.settings import Settings
 from service.state import ALWAYS_HEAVY, HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import refused_by_the_domain
+from service.to_domain.manoeuvre_of import manoeuvre_of, simulation_of
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
 
 #: Samples of the simulations that requirements are taken of.
 SIMULATED_SAMPLES = 501

@@ -7,19 +7,19 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from schedules.designed import DesignedEnvelope
-from service.answering import answer, encode
+from service.documentation.openapi import job_answers, problems
 from service.jobs.deferral import accepted
 from service.jobs.kinds.perturbed import perturbed_job
 from service.limits import fits_in_a_job, of_jobs
-from service.openapi import job_answers, problems
-from service.perturbed import Perturbed, WantedPerformance, perturbed
-from service.reading import prefers_async
-from service.refusals import LimitExceeded
 from service.routes.controllers import ControllerName
 from service.routes.designs import DesignId
 from service.schemas.robustness_answers import RobustPerformance
 from service.settings import Settings
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere, principal_of, state_of
+from service.studies.perturbed import Perturbed, WantedPerformance, perturbed
+from service.wire.answering import answer, encode
+from service.wire.reading import prefers_async
+from service.wire.refusals import LimitExceeded
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/robust-performance", tags=["controllers"])
 

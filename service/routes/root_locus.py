@@ -11,18 +11,18 @@ from design.frequency.loci import root_locus
 from design.frequency.locus_damping import gain_at_damping
 from design.loop import Loop, SisoLoop
 from schedules.designed import DesignedEnvelope
-from service.answering import answer, encode
 from service.designs import continuous_loop, controller_of, point_with_gains
+from service.documentation.openapi import problems
 from service.limits import check_size
-from service.openapi import problems
 from service.presenters.root_locus import root_locus_document
-from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.controllers import ControllerName, Point
 from service.routes.designs import DesignId
 from service.schemas.controller_answers import RootLocus
 from service.schemas.wire import PARAMETERS
 from service.settings import Settings
 from service.state import HEAVY, DesignsHere, SettingsHere
+from service.wire.answering import answer, encode
+from service.wire.refusals import FieldRefusal, InvalidRequest
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/root-locus", tags=["controllers"])
 

@@ -18,22 +18,22 @@ from design.sampling import Sampling
 from design.specs import QUANTITIES, Spec
 from model.arrays import FloatArray
 from schedules.designed import DesignedController, DesignedEnvelope
-from service.answering import answer, encode
 from service.designs import point_with_gains
+from service.documentation.openapi import problems
 from service.limits import check_size
-from service.lqr_studies import LqrName, refused_by_the_domain, state_feedback
-from service.openapi import problems
 from service.presenters.grid import grid_document
 from service.presenters.requirements import reference_document
 from service.presenters.sample_time_sweep import sweep_document
-from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, StudyNotPossible
 from service.routes.designs import DesignId
 from service.schemas import specs
 from service.schemas.sample_time_answers import SampleTimeSweep
 from service.schemas.wire import PARAMETERS
 from service.settings import Settings
-from service.spec_names import SPEC_FIELDS, spec_field
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import LqrName, refused_by_the_domain, state_feedback
+from service.wire.answering import answer, encode
+from service.wire.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, StudyNotPossible
+from service.wire.spec_names import SPEC_FIELDS, spec_field
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/sample-time-sweep", tags=["controllers"])
 

@@ -19,14 +19,14 @@ from schedules.files import (
 from schedules.proof.table_proof import proved_schedule
 from schedules.rules import IntegratorPlacement, Interpolation, OutOfRange, ScheduleRules
 from schedules.schedule_of import schedule_of
-from service.answering import answer, download_headers
 from service.designs import controller_of
-from service.openapi import problems
-from service.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound
+from service.documentation.openapi import problems
 from service.routes.designs import DesignId
 from service.schemas.wire import PARAMETERS
 from service.state import HEAVY, DesignsHere, SettingsHere
-from service.verification_of import origin_of, summary_of
+from service.to_domain.verification_of import origin_of, summary_of
+from service.wire.answering import answer, download_headers
+from service.wire.refusals import FieldRefusal, InvalidRequest, NoDesignAtPoint, NotFound
 
 router = APIRouter(prefix="/v1/designs/{id}/schedules", tags=["schedules"])
 

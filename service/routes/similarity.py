@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from service.answering import answer, encode
+from service.documentation.openapi import BODY, problems
 from service.limits import check_plant
-from service.openapi import BODY, problems
-from service.plant_studies import similarity as similarity_of
 from service.presenters.similarity import similarity_document
-from service.reading import JsonRoute
 from service.schemas.similarity import Similarity
 from service.schemas.studies import SimilarityRequest
 from service.state import HEAVY, SettingsHere
+from service.studies.plant import similarity as similarity_of
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
 
 router = APIRouter(prefix="/v1/similarity", tags=["model"], route_class=JsonRoute)
 

@@ -8,16 +8,16 @@ from fastapi import APIRouter, Query, Request, Response
 
 from design.disturbance.frequency_response import response_frequencies
 from design.frequency.poles import poles
-from service.answering import answer, encode
 from service.designs import point_with_gains
+from service.documentation.openapi import problems
 from service.limits import check_size
-from service.lqr_studies import LqrName, refused_by_the_domain, state_feedback
-from service.openapi import problems
 from service.presenters.simultaneous_margins import simultaneous_margins_document
 from service.routes.designs import DesignId
 from service.routes.frequency_response import WantedResponses, frequency_range
 from service.schemas.lqr_robustness import SimultaneousMargins
 from service.state import HEAVY, DesignsHere, SettingsHere
+from service.studies.state_feedback import LqrName, refused_by_the_domain, state_feedback
+from service.wire.answering import answer, encode
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/simultaneous-margins", tags=["controllers"])
 

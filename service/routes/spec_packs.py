@@ -7,11 +7,11 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from design.specs import SPEC_PACKS
-from service.answering import answer, encode
-from service.openapi import problems
+from service.documentation.openapi import problems
 from service.schemas.meta import SpecPacks
 from service.schemas.specs import PACK_NAMES, PackName
-from service.spec_names import spec_field
+from service.wire.answering import answer, encode
+from service.wire.spec_names import spec_field
 
 router = APIRouter(prefix="/v1/spec-packs", tags=["spec packs"])
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from service.answering import answer, encode
+from service.documentation.openapi import BODY, problems
 from service.limits import check_map
-from service.openapi import BODY, problems
-from service.plant_studies import steady_states
 from service.presenters.statics import statics_document
-from service.reading import JsonRoute
 from service.schemas.statics import SteadyStateMaps
 from service.schemas.studies import SteadyStateMapRequest
 from service.state import HEAVY, SettingsHere
+from service.studies.plant import steady_states
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
 
 router = APIRouter(prefix="/v1/steady-state-maps", tags=["model"], route_class=JsonRoute)
 

@@ -8,18 +8,15 @@ from fastapi import APIRouter, Query, Request, Response
 
 from schedules.proof.certificate import to_document
 from schedules.proof.prove import prove
-from service.answering import answer, download_headers, encode
 from service.designs import controller_of
-from service.openapi import BODY, problems
+from service.documentation.openapi import BODY, problems
 from service.presenters.verification import verification_document
-from service.reading import JsonRoute
-from service.refusals import StudyNotPossible
 from service.routes.controllers import ControllerName
 from service.routes.designs import DesignId
 from service.schemas.verification_answers import UploadedVerification, Verification
 from service.schemas.verification_requests import CertificateQuery, VerificationQuery, VerificationRequest
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
-from service.verification_of import (
+from service.to_domain.verification_of import (
     answerable,
     check_work,
     origin_of,
@@ -28,6 +25,9 @@ from service.verification_of import (
     uploaded_origin,
     verified,
 )
+from service.wire.answering import answer, download_headers, encode
+from service.wire.reading import JsonRoute
+from service.wire.refusals import StudyNotPossible
 
 router = APIRouter(prefix="/v1", tags=["verification"], route_class=JsonRoute)
 

@@ -7,18 +7,18 @@ from fastapi import APIRouter, Request, Response
 
 from design.lqr.weight_search import search_weights
 from design.lqr.weight_tradeoff import trade_off
-from service.answering import answer, encode
+from service.documentation.openapi import BODY, problems
 from service.limits import check_size
-from service.lqr_studies import LqrName, refused_by_the_domain, state_feedback
-from service.openapi import BODY, problems
 from service.presenters.weight_search import trade_off_document, weight_search_document
-from service.reading import JsonRoute
-from service.refusals import FieldRefusal, InvalidRequest
 from service.routes.designs import DesignId
 from service.schemas import weight_search_answers as answers
 from service.schemas.weight_search_requests import TradeOffRequest, WeightSearchRequest
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
-from service.weight_search_of import SoughtWeights, sought_weights
+from service.studies.state_feedback import LqrName, refused_by_the_domain, state_feedback
+from service.to_domain.weight_search_of import SoughtWeights, sought_weights
+from service.wire.answering import answer, encode
+from service.wire.reading import JsonRoute
+from service.wire.refusals import FieldRefusal, InvalidRequest
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}", tags=["controllers"], route_class=JsonRoute)
 

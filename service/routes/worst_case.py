@@ -15,10 +15,8 @@ from design.worst_case.reference import worst_reference
 from model.arrays import BoolArray
 from schedules.designed import DesignedController
 from schedules.study import Reference
-from service.answering import answer, encode
 from service.designs import controller_of, point_with_gains
-from service.lqr_studies import refused_by_the_domain
-from service.openapi import problems
+from service.documentation.openapi import problems
 from service.presenters.worst_case import worst_case_document, worst_reference_document
 from service.routes.controllers import ControllerName, Point
 from service.routes.designs import DesignId
@@ -26,7 +24,9 @@ from service.schemas.manoeuvres import RateLimit
 from service.schemas.wire import PARAMETERS
 from service.schemas.worst_case_answers import WorstCase, WorstReference
 from service.state import ALWAYS_HEAVY, DesignsHere, SettingsHere
-from service.worst_case_of import Admissible, admissible, check_rows, chosen, followed_loop, signals
+from service.studies.state_feedback import refused_by_the_domain
+from service.to_domain.worst_case_of import Admissible, admissible, check_rows, chosen, followed_loop, signals
+from service.wire.answering import answer, encode
 
 router = APIRouter(prefix="/v1/designs/{id}/controllers/{name}/worst-case", tags=["controllers"])
 

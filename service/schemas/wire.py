@@ -7,7 +7,7 @@ from typing import Any, cast
 from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from service.units import state_units
+from service.wire.units import state_units
 
 
 class Request(BaseModel):

@@ -8,12 +8,12 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.refusals import StoreUnavailable
 from service.store.blobs import Blobs
 from service.store.database import FILE_NAME, Database
 from service.store.integrity import Finding
 from service.store.orphans import referenced
 from service.store.store import FILES, Store
+from service.wire.refusals import StoreUnavailable
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from service.refusals import StoreUnavailable
+from service.wire.refusals import StoreUnavailable
 
 #: Beginning of the names of files that are being written.
 _UNFINISHED = "new-"

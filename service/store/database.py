@@ -10,9 +10,9 @@ from pathlib import Path
 from sqlalchemy import Connection, Engine
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.refusals import StoreUnavailable
 from service.store.engines import postgresql_engine, sqlite_engine
 from service.store.migrate import known, migrate, version_here, version_of
+from service.wire.refusals import StoreUnavailable
 
 FILE_NAME = "gainfield.db"
 #: How long a write waits for another process's write, and any statement for PostgreSQL [s].

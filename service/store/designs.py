@@ -11,12 +11,12 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, Select, bindparam, delete, exists, select, update
 
-from service.refusals import StoreUnavailable
 from service.store.blobs import Blobs
 from service.store.database import Database
 from service.store.insertion import insert_if_new
 from service.store.orphans import discard_unreferenced
 from service.store.tables import designs, ownerships
+from service.wire.refusals import StoreUnavailable
 
 #: The owner of everything where no keys are asked for.
 LOCAL = "local"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
 
-from service.refusals import StoreUnavailable
+from service.wire.refusals import StoreUnavailable
 
 if TYPE_CHECKING:
     import psycopg

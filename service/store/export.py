@@ -14,9 +14,9 @@ from typing import Any, Protocol
 import orjson
 from sqlalchemy import Row, select
 
-from service.refusals import StoreUnavailable
 from service.store.store import Store
 from service.store.tables import designs, ownerships
+from service.wire.refusals import StoreUnavailable
 
 FORMAT = "gainfield-export-1"
 #: No file in an archive carries the time of its writing: the same designs give the same bytes.

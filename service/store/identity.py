@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from sqlalchemy import select
 
-from service.refusals import StoreUnavailable
 from service.store.blobs import Blobs
 from service.store.database import Database
 from service.store.tables import identity
+from service.wire.refusals import StoreUnavailable
 
 
 def same_store(database: Database, blobs: Blobs) -> None:

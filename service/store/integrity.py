@@ -7,11 +7,11 @@ from typing import Literal
 
 from sqlalchemy import exists, select, text
 
-from service.refusals import StoreUnavailable
 from service.store.blobs import Blobs
 from service.store.database import Database
 from service.store.orphans import referenced
 from service.store.tables import designs, ownerships
+from service.wire.refusals import StoreUnavailable
 
 
 @dataclass(frozen=True)

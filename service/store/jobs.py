@@ -11,11 +11,11 @@ from typing import Any, Literal
 from sqlalchemy import ColumnElement, Connection, Update, delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from service.refusals import StoreUnavailable
 from service.store.blobs import Blobs
 from service.store.database import Database
 from service.store.designs import LOCAL
 from service.store.tables import chunks, jobs, leases
+from service.wire.refusals import StoreUnavailable
 
 State = Literal["queued", "running", "cancelling", "cancelled", "failed", "succeeded"]
 #: States in which a job stays until somebody asks for it again.

@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.refusals import StoreUnavailable
 from service.settings import Settings
 from service.store.blobs import Blobs
 from service.store.database import Database
@@ -19,6 +18,7 @@ from service.store.keys import KeyStore
 from service.store.orphans import sweep
 from service.store.repeated import RepeatedStore
 from service.store.retention import Kept, LetGo, let_go
+from service.wire.refusals import StoreUnavailable
 
 #: Directory of the content-addressed files, in the data directory.
 FILES = "files"

@@ -14,7 +14,7 @@ from fastapi.responses import FileResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.types import Scope
 
-from service.answering import answer
+from service.wire.answering import answer
 
 STATIC = Path(__file__).parent / "static"
 _PLOTLY = distribution("plotly")  # asked for its files only: nothing of it is imported

@@ -30,9 +30,9 @@ from schedules.run import run
 from schedules.schedule import GainSchedule, Provenance
 from schedules.schedule_of import schedule_of
 from schedules.to_control import gain_scheduled_system
-from service import study_of
-from service.design_examples import design_requests
+from service.documentation.design_examples import design_requests
 from service.schemas.requests import DesignRequest
+from service.to_domain import study_of
 
 WHERE = Provenance("0" * 32, "test", "0" * 64, "0", "2026-01-01T00:00:00Z")
 POINTS = [(0, 0), (1, 3)]

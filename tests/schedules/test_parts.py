@@ -23,11 +23,11 @@ from schedules.parts import Part, Synthesised, parts, synthesise
 from schedules.run import design, run
 from schedules.study import GridRequest
 from schedules.synthesised import PartDesign
-from service.answering import encode
 from service.examples import example
 from service.presenters.design import design_document
 from service.schemas.requests import DesignRequest
-from service.study_of import study as study_of
+from service.to_domain.study_of import study as study_of
+from service.wire.answering import encode
 
 #: More damping than the tab can give at any point, and only at some of them, the first ones among them.
 IMPOSSIBLE = (Spec("damping_ratio", "min", 0.999),)

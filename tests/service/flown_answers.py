@@ -11,7 +11,7 @@ from schedules.designed import DesignedEnvelope
 from schedules.run import run
 from service.examples import example
 from service.schemas.requests import DesignRequest
-from service.study_of import study
+from service.to_domain.study_of import study
 
 #: Field on the wire -> figure of the domain, and one of it in units of the wire.
 FIGURES = {

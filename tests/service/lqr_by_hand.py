@@ -11,9 +11,9 @@ from fastapi.testclient import TestClient
 from model.arrays import FloatArray
 from schedules.designed import DesignedController, DesignedEnvelope
 from schedules.run import run
-from service import study_of
-from service.design_examples import design_requests
+from service.documentation.design_examples import design_requests
 from service.schemas.requests import DesignRequest
+from service.to_domain import study_of
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from schedules.designed import DesignedEnvelope
 from schedules.inverse_sizing import inverse_sizing
 from schedules.surface_requirement import GroundGust, LoadCases, Sized
 from service.app import create_app
-from service.body_examples import BODIES
+from service.documentation.body_examples import BODIES
 from service.schemas import actuator_sizing_answers as answers
 from service.settings import Settings
 from tests.service.flown_answers import address, at_one_point, exactly, numbers, posted, wind_tunnel

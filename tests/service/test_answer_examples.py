@@ -16,15 +16,15 @@ from fastapi.routing import APIRoute
 from fastapi.testclient import TestClient
 from pydantic import TypeAdapter
 
-from service.answer_examples import ANSWERS, example_answer, file_name, marked, trimmed
 from service.app import create_app
-from service.curl_lines import curl_line
+from service.documentation.answer_examples import ANSWERS, example_answer, file_name, marked, trimmed
+from service.documentation.curl_lines import curl_line
+from service.documentation.operation_titles import GROUPS, TITLES
+from service.documentation.symbols import is_symbol
 from service.examples import example
-from service.operation_titles import GROUPS, TITLES
 from service.routes import ROUTERS
 from service.settings import Settings
-from service.symbols import is_symbol
-from service.units import unit_of
+from service.wire.units import unit_of
 from tests.make_answer_examples import ids, live_answers, prepare
 from tests.service.openapi_examples import operations
 

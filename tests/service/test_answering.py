@@ -11,7 +11,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from design.outcome import Outcome
-from service.answering import download_headers, encode
+from service.wire.answering import download_headers, encode
 
 
 def test_doubles_survive_to_the_last_bit() -> None:

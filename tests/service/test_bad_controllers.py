@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from service import study_of
 from service.designs import canonical
 from service.examples import example
-from service.pointers import field_refusal
 from service.schemas.requests import DesignRequest
+from service.to_domain import study_of
+from service.wire.pointers import field_refusal
 
 
 def at(document: Any, pointer: str, value: Any) -> Any:

@@ -13,14 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from service import study_of
 from service.app import create_app
 from service.designs import canonical
 from service.examples import example
-from service.pointers import field_refusal
 from service.schemas.lqr_requests import Lqr
 from service.schemas.requests import DesignRequest
 from service.settings import Settings
+from service.to_domain import study_of
+from service.wire.pointers import field_refusal
 from tests.service.lqr_bodies import (
     BALANCED,
     BRYSON,

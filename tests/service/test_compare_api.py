@@ -11,10 +11,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.design_examples import design_requests
+from service.documentation.design_examples import design_requests
 from service.examples import example
-from service.request_differences import MOST_LISTED, differences
 from service.settings import Settings
+from service.wire.request_differences import MOST_LISTED, differences
 from tests.service.flown_answers import posted
 from tests.service.lqr_by_hand import by_hand
 

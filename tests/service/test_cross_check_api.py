@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 
 import service.routes.cross_check as route
 from service.app import create_app
-from service.design_examples import design_requests
+from service.documentation.design_examples import design_requests
 from service.settings import Settings
 from tests.service.flown_answers import posted
 from tests.service.lqr_by_hand import by_hand

@@ -17,7 +17,7 @@ from service.examples import NAMES, example
 from service.schemas.design import Design, DesignList
 from service.schemas.requests import DesignRequest
 from service.settings import Settings
-from service.study_of import study
+from service.to_domain.study_of import study
 
 
 @pytest.mark.parametrize("name", NAMES)

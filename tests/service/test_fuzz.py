@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from service.examples import example
-from service.pointers import Place
+from service.wire.pointers import Place
 
 JSON = {"Content-Type": "application/json"}
 

@@ -11,9 +11,9 @@ from fastapi.testclient import TestClient
 from design.sampling import Sampling
 from model.linear_model import LinearModel
 from schedules.run import run
-from service.design_examples import design_requests
+from service.documentation.design_examples import design_requests
 from service.schemas.requests import DesignRequest
-from service.study_of import study
+from service.to_domain.study_of import study
 
 
 def designed(client: TestClient, name: str) -> dict[str, Any]:

@@ -19,10 +19,10 @@ from design.lqr.tracking import TrackingPlant, augment_with_integral
 from design.lqr.weights import BrysonWeights, ExplicitWeights, WeightsRefused
 from design.sampling import Sampling
 from schedules.study import Study
-from service import study_of
 from service.designs import canonical, design_id
 from service.examples import example
 from service.schemas.requests import DesignRequest
+from service.to_domain import study_of
 from tests.service.lqr_bodies import (
     BALANCED,
     BRYSON,

@@ -15,8 +15,8 @@ from design.disturbance.closed_system import closed_system
 from design.disturbance.h2 import h2_norm
 from design.disturbance.h_infinity import h_infinity_norm
 from design.robustness.simultaneous import simultaneous_margins
-from service.lqr_studies import refused_by_the_domain
-from service.refusals import StudyNotPossible
+from service.studies.state_feedback import refused_by_the_domain
+from service.wire.refusals import StudyNotPossible
 from tests.service.lqr_by_hand import ByHand, Posted, by_hand, example, posted
 
 DENSE = np.concatenate([[0.0], np.geomspace(1e-2, 1e5, 6000)])

@@ -10,11 +10,11 @@ from fastapi.routing import APIRoute
 from fastapi.testclient import TestClient
 from pydantic import TypeAdapter
 
-from service.design_examples import design_requests
-from service.errors import STATUS
+from service.documentation.design_examples import design_requests
 from service.jobs.example import EXAMPLE_PATH, example_body, example_job
 from service.routes import ROUTERS
 from service.schemas.problem import Problem
+from service.wire.errors import STATUS
 from tests.service.openapi_examples import address, operations
 
 METHODS = ("get", "post")

@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from service.body_examples import BODIES
+from service.documentation.body_examples import BODIES
 from service.examples import NAMES, example
 from tests.service.openapi_examples import address, operations
 

@@ -9,7 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.body_examples import DERIVATIVES, TABLE, plant
+from service.documentation.body_examples import DERIVATIVES, TABLE, plant
 from service.settings import Settings
 
 AILERON, TAB = [-18.0, -2.0, 6.0], [-20.0, -5.0, 0.0, 15.0]

@@ -16,7 +16,7 @@ from service.app import create_app
 from service.examples import example
 from service.schemas.requests import DesignRequest
 from service.settings import Settings
-from service.study_of import study
+from service.to_domain.study_of import study
 
 
 @pytest.fixture(scope="module")

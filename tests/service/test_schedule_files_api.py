@@ -14,7 +14,7 @@ from fastapi.testclient import TestClient
 
 from schedules.files import FILE_FORMATS, file_name, read_csv, read_json, read_npz, write_schedule
 from schedules.rules import ScheduleRules
-from service.design_examples import design_requests
+from service.documentation.design_examples import design_requests
 from service.examples import example
 
 TABLES = [f.suffix for f in FILE_FORMATS.values() if not f.says_missing]

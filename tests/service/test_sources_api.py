@@ -14,7 +14,7 @@ from model.hinge_moments.expansion import Angles
 from model.hinge_moments.taylor import fit_taylor
 from model.hinge_moments.xfoil_naca23012 import _FILE, xfoil_naca23012
 from service.app import create_app
-from service.body_examples import DERIVATIVES, ROWS, TABLE, plant
+from service.documentation.body_examples import DERIVATIVES, ROWS, TABLE, plant
 from service.settings import Settings
 
 JSON = {"Content-Type": "application/json"}

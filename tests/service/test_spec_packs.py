@@ -8,12 +8,12 @@ import numpy as np
 from fastapi.testclient import TestClient
 
 from design.specs import SPEC_PACKS
-from service import study_of
 from service.routes.spec_packs import NOTES
 from service.schemas.meta import SpecPacks
 from service.schemas.requests import DesignRequest
 from service.schemas.specs import PACK_NAMES, PackName
-from service.spec_names import SPEC_FIELDS
+from service.to_domain import study_of
+from service.wire.spec_names import SPEC_FIELDS
 
 
 def test_every_pack_of_the_domain_is_listed(client: TestClient) -> None:

@@ -23,16 +23,16 @@ from model import examples as sections
 from model.actuators import ActuatorLimits
 from model.system import TabAileron
 from schedules.study import Study
-from service import study_of
-from service.body_examples import BODIES
 from service.designs import design_id
+from service.documentation.body_examples import BODIES
 from service.examples import NAMES, example
 from service.schemas.controller_requests import NegativeFeedback, PositiveFeedback
 from service.schemas.flight import Grid
 from service.schemas.requests import DesignRequest
 from service.schemas.specs import PackSpecs, Specs
-from service.spec_names import SPEC_FIELDS
-from service.units import unit_of
+from service.to_domain import study_of
+from service.wire.spec_names import SPEC_FIELDS
+from service.wire.units import unit_of
 
 
 def request_of(document: Any) -> DesignRequest:

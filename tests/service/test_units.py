@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from service.allowed import allowed_by
-from service.units import state_units, unit_of
+from service.wire.allowed import allowed_by
+from service.wire.units import state_units, unit_of
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from schedules.proof.reading_error import reading_margins
 from schedules.proof.scheduling_rates import scheduling_rates
 from schedules.run import run
 from service.schemas.requests import DesignRequest
-from service.study_of import study
+from service.to_domain.study_of import study
 from tests.service.flown_answers import posted, wind_tunnel
 
 ROOT = Path(__file__).parents[2]

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from schedules.rules import INTEGRATOR_PLACEMENTS, INTERPOLATIONS
 from service.app import create_app
-from service.body_examples import BODIES
+from service.documentation.body_examples import BODIES
 from service.examples import example
 from service.settings import Settings
 from tests.service.flown_answers import posted

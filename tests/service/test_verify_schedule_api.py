@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from schedules.verify import verify
-from service.body_examples import BODIES
+from service.documentation.body_examples import BODIES
 from service.examples import example
 from tests.service.flown_answers import posted
 

@@ -23,13 +23,13 @@ from design.lqr.weight_tradeoff import trade_off
 from design.outcome import Outcome
 from design.specs import Spec
 from schedules.run import run
-from service import study_of
 from service.app import create_app
-from service.body_examples import BODIES
-from service.design_examples import design_requests
+from service.documentation.body_examples import BODIES
+from service.documentation.design_examples import design_requests
 from service.examples import example
 from service.schemas.requests import DesignRequest
 from service.settings import Settings
+from service.to_domain import study_of
 
 SPECS = {"settling_time_s_max": 0.3, "overshoot_percent_max": 5.0, "damping_ratio_min": 0.5}
 #: Weight of the wire -> of the domain, and its unit there.

@@ -15,11 +15,11 @@ from pydantic import ValidationError
 
 from design.worst_case.peaks import GuaranteedPeaks, guaranteed_peaks
 from service.app import create_app
-from service.manoeuvre_of import manoeuvre_of
 from service.presenters import worst_case as presenter
 from service.schemas.manoeuvres import Recorded
 from service.settings import Settings
-from service.worst_case_of import admissible
+from service.to_domain.manoeuvre_of import manoeuvre_of
+from service.to_domain.worst_case_of import admissible
 from tests.service.lqr_by_hand import Posted, example, posted
 
 RAD = np.pi / 180.0

@@ -8,13 +8,13 @@ from typing import Any
 
 import orjson
 
-from service.errors import problem
 from service.jobs.frames import cut, joined
 from service.jobs.given_designs import design_document, read_design
 from service.jobs.kinds.kind import Document, Finished, TaskFailed
 from service.store.designs import StoredDesign
 from service.store.jobs import Job, NewJob
 from service.store.store import Store
+from service.wire.errors import problem
 
 ANSWER = "answer"
 #: Headers of an answer that are kept beside its bytes.

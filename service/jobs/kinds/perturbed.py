@@ -9,17 +9,17 @@ from collections.abc import Sequence
 import orjson
 
 from schedules.perturbed_cases import FlownCases
-from service.answering import JSON, encode
 from service.designs import Designs
 from service.jobs.frames import cut, joined
 from service.jobs.given_designs import GivenDesigns, design_document, read_design
 from service.jobs.kinds.kind import Document, Finished
-from service.perturbed import Perturbed, WantedPerformance, perturbed
 from service.settings import Settings
 from service.store.designs import StoredDesign
 from service.store.jobs import Job, NewJob
 from service.store.store import Store
+from service.studies.perturbed import Perturbed, WantedPerformance, perturbed
 from service.version import code_version
+from service.wire.answering import JSON, encode
 
 PERTURBED = "perturbed"
 #: Limits were kept where the question was asked.

@@ -49,7 +49,7 @@ def test_each_sees_their_own(guarded: TestClient, refused: Any, quick: Any) -> N
 
 
 def verify_body(ident: str) -> dict[str, Any]:
-    from service.body_examples import BODIES
+    from service.documentation.body_examples import BODIES
 
     bodies = [example["value"] for example in BODIES["/v1/schedules/verify"]().values()]
     body = next(one for one in bodies if "design_id" in one or "design" in one)

@@ -13,7 +13,7 @@ from typing import Any
 
 import httpx2
 
-from service.design_examples import design_requests
+from service.documentation.design_examples import design_requests
 from service.schemas.problem import Problem
 from tests.service.http.running import Running, server
 from tests.service.openapi_examples import address, operations

@@ -21,10 +21,10 @@ from service.jobs.kinds.design import design_job
 from service.jobs.outcome import Outcome
 from service.jobs.runner import ROLE, Runner
 from service.jobs.worker import work
-from service.refusals import StoreUnavailable
 from service.schemas.requests import DesignRequest
 from service.store.jobs import Job
 from service.store.store import Store
+from service.wire.refusals import StoreUnavailable
 
 LEASE = 1.0
 

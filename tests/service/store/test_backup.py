@@ -14,7 +14,6 @@ from typing import Any
 import orjson
 import pytest
 
-from service.refusals import StoreUnavailable
 from service.store import blobs as files
 from service.store.backup import backup
 from service.store.database import FILE_NAME
@@ -22,6 +21,7 @@ from service.store.designs import StoredDesign
 from service.store.export import export
 from service.store.integrity import Finding
 from service.store.store import Store
+from service.wire.refusals import StoreUnavailable
 
 Made = Callable[..., StoredDesign]
 

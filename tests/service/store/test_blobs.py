@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from service.refusals import StoreUnavailable
 from service.store.blobs import Blobs
+from service.wire.refusals import StoreUnavailable
 
 
 @pytest.fixture

@@ -11,12 +11,12 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import text
 
-from service.refusals import StoreUnavailable
 from service.store.blobs import Blobs
 from service.store.database import FILE_NAME
 from service.store.designs import LOCAL, StoredDesign
 from service.store.store import Store
 from service.store.tables import metadata
+from service.wire.refusals import StoreUnavailable
 from tests.service.store.test_designs import at_once
 
 Made = Callable[..., StoredDesign]

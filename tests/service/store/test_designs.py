@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from sqlalchemy import text, update
 
-from service.refusals import StoreUnavailable
 from service.store.designs import StoredDesign
 from service.store.store import Store
 from service.store.tables import designs
+from service.wire.refusals import StoreUnavailable
 
 Made = Callable[..., StoredDesign]
 Open = Callable[[], Store]

@@ -17,11 +17,11 @@ from fastapi.testclient import TestClient
 from sqlalchemy import event
 
 from service.app import create_app
-from service.refusals import StoreUnavailable
 from service.settings import Settings
 from service.store import blobs
 from service.store.designs import StoredDesign
 from service.store.store import Store
+from service.wire.refusals import StoreUnavailable
 from tests.service.test_durability import call, server, status_of
 
 Break = Callable[[pytest.MonkeyPatch, Store], None]

@@ -12,13 +12,13 @@ from pydantic import SecretStr
 from sqlalchemy import text
 
 from service.app import create_app
-from service.refusals import StoreUnavailable
 from service.settings import Settings
 from service.store import database
 from service.store.database import bring_up
 from service.store.designs import StoredDesign
 from service.store.migrate import version_here
 from service.store.store import Store
+from service.wire.refusals import StoreUnavailable
 from tests.service.store.postgresql import Server
 from tests.service.store.test_designs import at_once
 

@@ -11,7 +11,7 @@ from fastapi.routing import APIRoute
 from starlette.requests import ClientDisconnect
 
 from service.http.repeats import answered_once
-from service.refusals import UnreadableBody, UnsupportedMediaType
+from service.wire.refusals import UnreadableBody, UnsupportedMediaType
 
 #: More fields than any object of a request has. Each one that is unknown is an error of its own, and takes time.
 MAX_FIELDS = 1000

@@ -18,14 +18,14 @@ from model.system import TabAileron
 from schedules.analysis import PlantEnvelope, analyse
 from schedules.study import PlantStudy
 from service.limits import check_envelope
-from service.plant_studies import asked_of_model, flight_grid_of, system_of
-from service.refusals import FieldRefusal, InvalidRequest
-from service.request_fields import changed_request, number_at, unit_at
 from service.schemas.aerodynamics import Table
 from service.schemas.hinge_tables import Taylor
 from service.schemas.studies import EigenvalueSweepRequest
-from service.study_of import breakpoints, plant_study
-from service.units import unit_of
+from service.studies.plant import asked_of_model, flight_grid_of, system_of
+from service.to_domain.study_of import breakpoints, plant_study
+from service.wire.refusals import FieldRefusal, InvalidRequest
+from service.wire.request_fields import changed_request, number_at, unit_at
+from service.wire.units import unit_of
 
 #: Wire name -> the model's name, and whether it is an angle in degrees.
 QUANTITIES: dict[str, tuple[SweptQuantity, bool]] = {

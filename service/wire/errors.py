@@ -14,9 +14,9 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import Match
 
-from service import refusals
-from service.pointers import field_refusal
-from service.refusals import FieldRefusal
+from service.wire import refusals
+from service.wire.pointers import field_refusal
+from service.wire.refusals import FieldRefusal
 
 MEDIA_TYPE = "application/problem+json"
 #: A body can hold a hundred thousand wrong numbers; the answer names the first of them.

@@ -15,9 +15,9 @@ from schedules.flown_figures import MARGIN_QUANTITIES, STEP_QUANTITIES
 from schedules.judging import asked
 from service.designs import continuous_loop, controller_of
 from service.limits import check_size
-from service.refusals import InvalidRequest, StudyNotPossible
 from service.schemas.wire import PARAMETERS
 from service.settings import Settings
+from service.wire.refusals import InvalidRequest, StudyNotPossible
 
 #: Whose specs a loop must meet to be held.
 WhoseSpecs = Literal["request", "spec_pack", "none"]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from service.refusals import FieldRefusal, InvalidRequest
 from service.schemas.requests import LinearModelsRequest
 from service.schemas.wire import Request
-from service.units import unit_of
+from service.wire.refusals import FieldRefusal, InvalidRequest
+from service.wire.units import unit_of
 
 #: The parts of a request that a linear model depends on.
 PARTS = tuple(LinearModelsRequest.model_fields)

@@ -11,18 +11,18 @@ from fastapi import FastAPI
 from pydantic.json_schema import models_json_schema
 
 from service.access.door import OPEN
-from service.answer_examples import example_answer
-from service.body_examples import BODIES
-from service.curl_lines import curl_line
-from service.design_examples import design_requests
-from service.errors import MEDIA_TYPE, STATUS, problem
+from service.documentation.answer_examples import example_answer
+from service.documentation.body_examples import BODIES
+from service.documentation.curl_lines import curl_line
+from service.documentation.design_examples import design_requests
+from service.documentation.operation_titles import GROUPS, TITLES
+from service.documentation.symbols import describe_symbols
 from service.http.repeats import HEADER, LONGEST_KEY
-from service.operation_titles import GROUPS, TITLES
-from service.refusals import FieldRefusal
 from service.schemas.jobs import Job
 from service.schemas.problem import FieldProblem, Problem
-from service.symbols import describe_symbols
-from service.units import state_units
+from service.wire.errors import MEDIA_TYPE, STATUS, problem
+from service.wire.refusals import FieldRefusal
+from service.wire.units import state_units
 
 #: What a route that reads a body may refuse it for.
 BODY = (400, 413, 415, 422)

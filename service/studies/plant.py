@@ -21,9 +21,9 @@ from model.system import TabAileron
 from schedules.analysis import PlantEnvelope
 from schedules.study import PlantStudy
 from service.designs import analysed
-from service.refusals import FieldRefusal, InvalidRequest
 from service.schemas import studies
-from service.study_of import SPEED_AXIS, breakpoints, trim
+from service.to_domain.study_of import SPEED_AXIS, breakpoints, trim
+from service.wire.refusals import FieldRefusal, InvalidRequest
 
 log = logging.getLogger("gainfield")
 

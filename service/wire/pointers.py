@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from service.allowed import Schema, allowed_by, dereferenced, is_null
-from service.refusals import FieldRefusal
+from service.wire.allowed import Schema, allowed_by, dereferenced, is_null
+from service.wire.refusals import FieldRefusal
 
 #: What is wrong, where pydantic's own words are about Python.
 _DETAILS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from service.units import without_unit
+from service.wire.units import without_unit
 
 #: Words of one or two letters that are words, and no symbols.
 _WORDS = frozenset({"at", "by", "id", "in", "is", "of", "on", "or", "to", "up", "no"})

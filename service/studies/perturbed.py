@@ -23,10 +23,10 @@ from schedules.perturbations import (
 from schedules.perturbations import PARAMETERS as UNCERTAIN
 from schedules.perturbed_cases import FlownCases, case_blocks, fly_cases
 from schedules.robust_performance import assemble, flight_of
-from service.flown_away import Flown, carried_controller, check_loops, flown, flown_specs
 from service.presenters.robust_performance import Drawn, robust_performance_document
-from service.refusals import FieldRefusal, InvalidRequest
 from service.settings import Settings
+from service.studies.flown_away import Flown, carried_controller, check_loops, flown, flown_specs
+from service.wire.refusals import FieldRefusal, InvalidRequest
 
 #: Largest relative change of a parameter; 0 leaves it as it is.
 Change = Annotated[float, Field(ge=0.0, le=99.0)]

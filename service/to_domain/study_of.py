@@ -19,15 +19,15 @@ from model.hinge_moments.expansion import Angles
 from model.section import Body, Geometry, Inertia
 from model.trim_request import LARGEST_TRIM_ANGLE, HeldTorque, TrimRequest
 from schedules.study import Controller, GridRequest, PlantStudy, Reference, Study
-from service import lqr_of
 from service.schemas import actuators, aerodynamics, controller_requests, flight, lqr_requests, requests, section
 from service.schemas import trim as trims
 from service.schemas.any_controller import AnyController
 from service.schemas.given_gains import Gains
 from service.schemas.grid_values import GridAxes, OverGrid
 from service.schemas.specs import SpecPack, Specs
-from service.source_of import hinge_moment_source, model_refuses
-from service.spec_names import SPEC_FIELDS
+from service.to_domain import lqr_of
+from service.to_domain.source_of import hinge_moment_source, model_refuses
+from service.wire.spec_names import SPEC_FIELDS
 
 SPEED_AXIS: dict[str, SpeedAxis] = {
     "dynamic_pressure_pa": "dynamic_pressure",

@@ -17,9 +17,9 @@ from schedules.study import Reference
 from schedules.wire_names import wire_name
 from service.designs import continuous_loop
 from service.limits import check_size
-from service.refusals import FieldRefusal, InvalidRequest, StudyNotPossible
 from service.settings import Settings
-from service.signal_units import signal_unit
+from service.wire.refusals import FieldRefusal, InvalidRequest, StudyNotPossible
+from service.wire.signal_units import signal_unit
 
 #: Swings of a step response at which a row takes twice the time of one without: of references that may jump, and of
 #: others, whose programmes then grow with the square of the swings.

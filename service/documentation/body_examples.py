@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from service.design_examples import design_requests
+from service.documentation.design_examples import design_requests
 from service.examples import NAMES, example
 
 Examples = dict[str, dict[str, Any]]

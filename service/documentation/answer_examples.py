@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-ANSWERS = Path(__file__).parent / "examples" / "answers"
+ANSWERS = Path(__file__).parent.parent / "examples" / "answers"
 #: How many entries of a list are kept: of numbers and words, and of anything larger.
 _KEPT, _KEPT_LARGE = 4, 2
 _MARK = "<{}>"

@@ -23,13 +23,13 @@ from model.actuators import Actuator
 from model.arrays import BoolArray, FloatArray
 from schedules.study import Study
 from schedules.wire_names import axis_name
-from service.lqr_studies import StateFeedback
-from service.refusals import FieldRefusal, InvalidRequest, StudyNotPossible
 from service.schemas import weights
 from service.schemas.grid_values import GridAxes, fields_on_grid
 from service.schemas.weight_search_requests import SearchRequest, SoughtSpecs
-from service.spec_names import SPEC_FIELDS
-from service.study_of import over_grid
+from service.studies.state_feedback import StateFeedback
+from service.to_domain.study_of import over_grid
+from service.wire.refusals import FieldRefusal, InvalidRequest, StudyNotPossible
+from service.wire.spec_names import SPEC_FIELDS
 
 #: Weight of Bryson's rule -> its field on the wire. Those that end in ``_n_m`` are torques, the others angles.
 WIRE_NAMES: dict[str, str] = {

@@ -31,11 +31,9 @@ from schedules.proof.table_proof import TableProof, table_proof
 from schedules.study import Controller, GridRequest, Reference, Study
 from schedules.uploaded_schedule import gain_units, needed_gains, on_axes, state_feedback_of, uploaded_schedule
 from schedules.wire_names import inner_name
-from service import study_of
 from service.designs import Designs, controller_of
 from service.limits import check_envelope, check_size, check_table
 from service.presenters.verification import NOT_ASKED, Verified
-from service.refusals import FieldRefusal, InvalidRequest, LimitExceeded, StudyNotPossible
 from service.schemas.requests import MOST_UNDER_WAY
 from service.schemas.verification_requests import (
     FlownController,
@@ -46,7 +44,9 @@ from service.schemas.verification_requests import (
     WantedSummary,
 )
 from service.settings import Settings
+from service.to_domain import study_of
 from service.version import code_version
+from service.wire.refusals import FieldRefusal, InvalidRequest, LimitExceeded, StudyNotPossible
 
 #: Work of reading errors and of rates of flight, in pieces of a cell.
 MARGIN_PIECES, RATE_PIECES = 26, 150

@@ -18,9 +18,9 @@ from model.hinge_moments.read_table import read_table
 from model.hinge_moments.table import HingeMomentTable, table_of_rows
 from model.hinge_moments.taylor import fit_taylor
 from model.hinge_moments.thin_aerofoil import ThinAerofoil
-from service.refusals import FieldRefusal, InvalidRequest
 from service.schemas import aerodynamics, section
 from service.schemas.hinge_tables import Taylor
+from service.wire.refusals import FieldRefusal, InvalidRequest
 
 #: What a table must be to be taken, whatever the fit.
 WORKING_ROWS = "rows with both coefficients, of at least two tab and two aileron angles"

@@ -14,7 +14,7 @@ from design.loop import Loop
 from design.lqr.controller import LqrController
 from schedules.designed import DesignedController, DesignedEnvelope
 from service.designs import controller_of
-from service.refusals import StudyNotPossible
+from service.wire.refusals import StudyNotPossible
 
 _NAME = "Name of the controller, a state feedback"
 #: A state feedback, and one whose weights weigh power, of the examples that documentation shows.

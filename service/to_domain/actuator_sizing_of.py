@@ -8,8 +8,8 @@ from math import radians
 from design.actuator_sizing.selection import Candidate, RatioRange
 from schedules.study import Study
 from schedules.surface_requirement import GroundGust, LoadCases, Sized
-from service.manoeuvre_of import manoeuvre_of
 from service.schemas import actuator_sizing as wire
+from service.to_domain.manoeuvre_of import manoeuvre_of
 
 
 def candidate(asked: wire.Candidate) -> Candidate:

@@ -1,4 +1,4 @@
-"""What the service refuses, as exceptions that know nothing of HTTP; `service.errors` gives each its status."""
+"""What the service refuses, as exceptions that know nothing of HTTP; `service.wire.errors` gives each its status."""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""What the routes of a kind of study have in common."""
