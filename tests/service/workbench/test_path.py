@@ -42,6 +42,10 @@ def test_the_map_shows_what_the_design_says(tab: Any, open_example: Callable[...
     tab.locator(".plot-canvas").evaluate("el => el.emit('plotly_click', {points: [{x: '980', y: '3000'}]})")
     assert "point=6" in tab.evaluate("location.hash")
     assert tab.get_by_label("Point", exact=True).input_value() == "6"
+    tab.get_by_role("navigation", name="Views of this point").get_by_role("link", name="Root locus").click()
+    tab.get_by_role("heading", name="Gains of nf at this point").wait_for()
+    assert tab.get_by_label("Point", exact=True).input_value() == "6"
+    assert float(tab.get_by_label("K_p", exact=True).input_value()) == pytest.approx(gains[1]["values"][1][2], rel=1e-4)
 
 
 def test_an_address_brings_the_view_back(

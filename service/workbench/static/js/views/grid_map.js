@@ -1,5 +1,6 @@
 /** The envelope as a map: one figure of the design at every grid point; a click or the arrow keys choose a point. */
 
+import { addressOf } from "../permalink.js";
 import { drawField } from "./field_map.js";
 import { fieldOf, figureOptions, sourceOf } from "./grid_figures.js";
 import { drawProof, proofTable } from "./proof_map.js";
@@ -8,6 +9,8 @@ import { offer } from "./slow_study.js";
 const ARROWS = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [1, 0], ArrowDown: [-1, 0] };
 /** Cells that are proved at once; more are begun by a button. */
 const QUICK_CELLS = 40;
+/** Where to look closer at the chosen point. */
+const CLOSER = [["root-locus", "Root locus"], ["response", "Response in time"], ["bode", "Bode plots"]];
 
 export default { id: "map", title: "Map of the envelope", group: "envelope", needs: ["controller", "point"], mount };
 
@@ -124,6 +127,7 @@ function mount(el, { api, state, plot, dom, format, grid, param, setParam, show 
       h("h4", {}, `Gains of ${own.name}`),
       h("p", {}, h("span", { class: `tag ${outcome === "ok" ? "good" : "bad"}` }, outcome.replaceAll("_", " ")), reason ? ` ${reason}` : ""),
       list(gains),
+      h("nav", { class: "row small", "aria-label": "Views of this point" }, CLOSER.map(([view, title]) => h("a", { href: addressOf({ ...state.get(), view, params: {} }) }, title))),
     );
   }
 }
