@@ -20,7 +20,7 @@ serve: .venv/ready
 	$(BIN)/python -m service --host $(HOST) --port $(PORT)
 
 test: lint
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 lint: .venv/ready-dev
 	$(BIN)/ruff check

@@ -20,6 +20,11 @@ if os.environ.get("CI") == "true":
     settings.load_profile("ci")
 
 
+def pytest_collection_modifyitems(items):
+    """Tests of the service first: their files take longest, and a long one at the end would run alone."""
+    items.sort(key=lambda item: "service" not in item.path.parts)
+
+
 def _wind_tunnel_plant(system, trim_request):
     from model.flight import flight_grid
     from model.linearise import linearise

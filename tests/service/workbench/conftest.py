@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -60,8 +61,14 @@ def serve() -> Callable[[Settings], AbstractContextManager[str]]:
     return served
 
 
+@pytest.fixture(scope="session")
+def profile(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where Chromium keeps what it has compiled: the plotting script takes a second otherwise, in every test."""
+    return tmp_path_factory.mktemp("profile")
+
+
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser(profile: Path) -> Iterator[Any]:
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if chromium is None:
         if os.environ.get("CI") == "true":
@@ -70,7 +77,9 @@ def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        opened = playwright.chromium.launch_persistent_context(
+            profile, executable_path=chromium, args=FLAGS, accept_downloads=True
+        )
         yield opened
         opened.close()
 
@@ -97,27 +106,28 @@ def watch() -> Watch:
 @pytest.fixture
 def new_tab(address: str, browser: Any, watch: Watch) -> Iterator[Callable[..., Any]]:
     """Make pages of a size and colour scheme; at the end none may have failed or asked another host."""
-    contexts = []
+    tabs = []
 
     def seen(request: Any) -> None:
         if not request.url.startswith((address, "data:", "blob:")):
             watch.outside.append(request.url)
 
     def make(width: int = 1280, height: int = 860, scheme: str = "light") -> Any:
-        context = browser.new_context(
-            viewport={"width": width, "height": height}, color_scheme=scheme, accept_downloads=True
-        )
-        contexts.append(context)
-        context.on("request", seen)
-        tab = context.new_page()
+        tab = browser.new_page()
+        tabs.append(tab)
+        tab.set_viewport_size({"width": width, "height": height})
+        tab.emulate_media(color_scheme=scheme)
         tab.set_default_timeout(WAIT)
+        tab.on("request", seen)
         tab.on("console", watch.console)
         tab.on("pageerror", lambda error: watch.failures.append(str(error)))
         return tab
 
     yield make
-    for context in contexts:
-        context.close()
+    for tab in tabs:
+        if tab.url.startswith(address):
+            tab.evaluate("localStorage.clear()")
+        tab.close()
     assert watch.failures == []
     assert watch.outside == []
 

@@ -96,6 +96,24 @@ def test_a_gain_moves_the_poles(tab: Any, address: str, design: dict[str, Any], 
         assert far(complexes(trace(tab, "all loops closed")), closed) < 1e-9
 
 
+def test_a_slow_service_has_the_last_word(tab: Any, address: str, design: dict[str, Any]) -> None:
+    """Poles between the samples of the old locus give way to those of the new one, however late it comes."""
+    visit(tab, address, design, "root-locus", controller="nf", loop="K_d")
+    tab.locator(DRAWN).nth(1).wait_for()
+    until(tab, "!document.querySelector('[aria-busy]')")
+
+    def late(route: Any) -> None:
+        tab.wait_for_timeout(700)
+        route.continue_()
+
+    tab.route("**/v1/previews", late)
+    value = slide(tab, "K_d", 0.2)
+    settled(tab, "K_d", value)
+    locus = previewed(address, design, "nf", {"K_d": value}, loop="K_d", studies=["root_locus"])["root_locus"]
+    at = locus["gains"].index(value)
+    assert far(complexes(trace(tab, POLES)), wire([branch[at] for branch in locus["branches"]])) < 1e-9
+
+
 def test_a_weight_moves_the_poles(tab: Any, address: str, design: dict[str, Any]) -> None:
     visit(tab, address, design, "point-weights", controller="lqr")
     tab.locator(DRAWN).nth(2).wait_for()

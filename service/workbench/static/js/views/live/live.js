@@ -61,7 +61,7 @@ export function liveController(el, context, { scope, studies, query = () => ({})
     }
     const request = scope.request(design, designed, point);
     const knobs = [...extra(), ...knobsOf(request.controllers[0], designed)];
-    const own = { signal, request, knobs, values: {}, wanted: null, busy: false, designed: null, problems: {}, timer: 0, shown: null };
+    const own = { signal, request, knobs, values: {}, wanted: null, busy: false, designed: null, problems: {}, timer: 0, asked: studies };
     session = own;
     own.values = fromAddress(own);
     drawPanel(own);
@@ -129,7 +129,10 @@ export function liveController(el, context, { scope, studies, query = () => ({})
   function move(own, id, value) {
     own.values = { ...own.values, [id]: value };
     own.reset.disabled = !moved(own);
-    if (own.knobs.find((knob) => knob.id === id).path) ask(own, moving(id)); // the service works while the page draws
+    if (own.knobs.find((knob) => knob.id === id).path) {
+      own.asked = moving(id);
+      ask(own, own.asked); // the service works while the page draws
+    }
     onMove?.(own.values);
     settleSoon(own);
   }
@@ -157,7 +160,7 @@ export function liveController(el, context, { scope, studies, query = () => ({})
       own.timer = 0;
       if (own !== session) return;
       toAddress(own);
-      if (own.shown && studies.some((study) => !own.shown.includes(study))) ask(own, studies);
+      if (studies.some((study) => !own.asked.includes(study))) ask(own, studies);
     }, SETTLED_MS);
   }
 
@@ -172,7 +175,6 @@ export function liveController(el, context, { scope, studies, query = () => ({})
       try {
         const answer = await post(own, requestNow(own), now);
         if (own !== session) return;
-        own.shown = now;
         accept();
         await tell(own, answer);
       } catch (problem) {
