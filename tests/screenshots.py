@@ -4,45 +4,23 @@ from __future__ import annotations
 
 import argparse
 import json
-import shutil
-import threading
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.request import Request, urlopen
 
-import uvicorn
 from playwright.sync_api import sync_playwright
 
-from service.app import create_app
 from service.examples import NAMES, example
 from service.settings import Settings
+from tests.served import FLAGS, chromium, served
 
-FLAGS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--enable-unsafe-swiftshader"]
 SCHEMES = ("light", "dark")
 HEIGHT = 860
 #: Views that are of a state feedback only.
 OF_LQR = ("weights", "point-weights", "phase")
 #: What is under way in a page, or awaits the reader.
 BUSY = "[aria-busy], .message.loading"
-
-
-@contextmanager
-def served() -> Iterator[str]:
-    """A server with a store of its own on a free port of this machine."""
-    with TemporaryDirectory() as folder:
-        app = create_app(Settings(data_dir=Path(folder)))
-        server = uvicorn.Server(uvicorn.Config(app, host="127.0.0.1", port=0, log_level="warning"))
-        thread = threading.Thread(target=server.run)
-        thread.start()
-        while not server.started:
-            time.sleep(0.02)
-        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-        server.should_exit = True
-        thread.join()
 
 
 def made(address: str, name: str) -> str:
@@ -65,10 +43,13 @@ def addresses(tab: Any, first: str, other: str) -> dict[str, str]:
 def take(folder: Path, only: str, width: int, whole: bool) -> None:
     """Write the pictures whose name contains `only`."""
     folder.mkdir(parents=True, exist_ok=True)
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    with served() as address, sync_playwright() as playwright:
+    with (
+        TemporaryDirectory() as kept,
+        served(Settings(data_dir=Path(kept))) as address,
+        sync_playwright() as playwright,
+    ):
         first, other = made(address, NAMES[0]), made(address, NAMES[1])
-        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
         for scheme in SCHEMES:
             page = browser.new_context(viewport={"width": width, "height": HEIGHT}, color_scheme=scheme)
             tab = page.new_page()

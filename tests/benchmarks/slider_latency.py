@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
-import threading
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -16,11 +11,10 @@ from typing import Any
 from urllib.request import Request, urlopen
 
 import numpy as np
-import uvicorn
 
-from service.app import create_app
 from service.examples import example
 from service.settings import Settings
+from tests.served import FLAGS, chromium, served
 
 MOVES = 30
 #: What a hand takes for at once [s].
@@ -35,7 +29,6 @@ SLIDERS = (
     ("gain: Bode plot and margins", "bode?controller=nf", "K_p"),
     ("gain: Nichols chart and margins", "nichols?controller=nf", "K_p"),
 )
-FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update")
 
 #: Times [ms] from the input event to the last plot's after-draw, a list of one a move.
 MOVE = """async ([knob, moves]) => {
@@ -80,14 +73,18 @@ class Latency:
 
 def latencies() -> list[Latency] | None:
     """Times of every slider on the example with 25 points; None where there is no Chromium."""
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if chromium is None:
+    path = chromium()
+    if path is None:
         return None
     from playwright.sync_api import sync_playwright
 
-    with tempfile.TemporaryDirectory() as folder, _server(Path(folder)) as address, sync_playwright() as playwright:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        served(Settings(data_dir=Path(folder))) as address,
+        sync_playwright() as playwright,
+    ):
         ident = _design(address)
-        opened = playwright.chromium.launch(executable_path=chromium, args=list(FLAGS))
+        opened = playwright.chromium.launch(executable_path=path, args=FLAGS)
         try:
             tab = opened.new_page(viewport={"width": 1280, "height": 1000})
             page = f"{{}}/#/explore/{{}}&design={ident}&point=12"
@@ -116,23 +113,3 @@ def _design(address: str) -> str:
     asked = Request(f"{address}/v1/designs", json.dumps(request).encode(), {"Content-Type": "application/json"})
     with urlopen(asked, timeout=60.0) as answer:
         return str(json.load(answer)["id"])
-
-
-@contextmanager
-def _server(folder: Path) -> Iterator[str]:
-    """The service on a free port of this machine."""
-    server = uvicorn.Server(
-        uvicorn.Config(create_app(Settings(data_dir=folder)), host="127.0.0.1", port=0, log_level="warning")
-    )
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    try:
-        deadline = time.monotonic() + 30.0
-        while not server.started:
-            if not thread.is_alive() or time.monotonic() > deadline:
-                raise RuntimeError("the service did not start")
-            time.sleep(0.02)
-        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-    finally:
-        server.should_exit = True
-        thread.join()

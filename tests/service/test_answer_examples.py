@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-import threading
 import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
-import uvicorn
 from fastapi.routing import APIRoute
 from fastapi.testclient import TestClient
 from pydantic import TypeAdapter
@@ -26,6 +24,7 @@ from service.routes import ROUTERS
 from service.settings import Settings
 from service.wire.units import unit_of
 from tests.make_answer_examples import ids, live_answers, prepare
+from tests.served import served
 from tests.service.openapi_examples import operations
 
 
@@ -136,15 +135,8 @@ def test_the_document_is_small_and_its_own_part_quick() -> None:
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A real server on a free port of this machine."""
-    app = create_app(Settings(data_dir=tmp_path_factory.mktemp("shell")))
-    server = uvicorn.Server(uvicorn.Config(app, host="127.0.0.1", port=0, log_level="warning"))
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    while not server.started:
-        time.sleep(0.02)
-    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-    server.should_exit = True
-    thread.join()
+    with served(Settings(data_dir=tmp_path_factory.mktemp("shell"))) as at:
+        yield at
 
 
 @pytest.mark.skipif(shutil.which("curl") is None, reason="there is no curl on this machine")

@@ -123,7 +123,7 @@ function styled(trace, index) {
 function themed(layout) {
   const axis = { gridcolor: "--line", linecolor: "--line-strong", zerolinecolor: "--line-strong", ticks: "outside", tickcolor: "--line-strong", automargin: layout.margin === undefined };
   const axes = Object.keys(layout).filter((key) => /^[xy]axis\d*$/.test(key));
-  const themedAxes = Object.fromEntries([...new Set(["xaxis", "yaxis", ...axes])].map((key) => [key, { ...axis, ...layout[key] }]));
+  const themedAxes = Object.fromEntries([...new Set(["xaxis", "yaxis", ...axes])].map((key) => [key, { ...axis, ...layout[key], title: { standoff: 8, ...layout[key]?.title } }]));
   return {
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",

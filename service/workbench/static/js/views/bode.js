@@ -1,11 +1,8 @@
 /** Bode plots of the loop with its margins, and of what else the loop does: S, T, KS, reference, disturbances, noise. */
 
-import { liveController } from "./live/live.js";
-import { AT_POINT } from "./live/scope.js";
+import { frequencyView } from "./live/frequency_view.js";
 import { cutLoop, decibels, marginMarks } from "./loop_curves.js";
-import { figureTable, reasonList, verdictLine } from "./point_figures.js";
 
-const STUDIES = ["point", "frequency_response"];
 const FREQUENCIES = 240;
 const SETS = {
   sensitivity: "Sensitivity S",
@@ -20,69 +17,27 @@ export default { id: "bode", title: "Bode plots", group: "point", needs: ["contr
 
 function mount(el, context) {
   const { plot, dom, param, setParam } = context;
-  const { h } = dom;
-  const choice = h("div", { class: "row" });
-  el.append(choice);
-  const live = liveController(el, context, { scope: AT_POINT, studies: STUDIES, query: () => ({ frequencies: FREQUENCIES }), onAnswer });
-  const picture = h("div", {});
-  const figures = h("div", { class: "stack" });
-  live.body.append(h("div", { class: "live-wide" }, picture, figures));
-  let answer = null;
-  live.start();
-  return { update, unmount };
+  return frequencyView(el, context, { frequencies: FREQUENCIES, choices, draw });
 
-  function unmount() {
-    live.unmount();
-    plot.forget(picture);
-  }
-
-  function update(changed) {
-    if (changed.has("controller") || changed.has("point") || changed.has("design")) {
-      answer = null;
-      dom.clear(choice);
-    }
-    live.update(changed);
-    if (answer && changed.has("params")) {
-      drawChoice();
-      draw();
-    }
-  }
-
-  function onAnswer(told) {
-    const first = answer === null;
-    answer = told;
-    const [mine, designed] = [told.now.point.controllers[0], told.designed.point.controllers[0]];
-    if (first) drawChoice();
-    dom.clear(figures).append(verdictLine(mine), figureTable(mine, designed), reasonList(mine));
-    if (told.now.frequency_response) return draw();
-    dom.message(picture, "refused", told.problems.frequency_response.detail);
-    return undefined;
-  }
-
-  function options() {
-    const { frequency_response: found, point } = answer.designed;
+  function options({ designed: { frequency_response: found, point } }) {
     if (!found) return [];
     const loops = Object.keys(point.controllers[0].margins).map((input) => ({ value: `loop.${input}`, label: `L, opened at the ${input}`, group: "Loop" }));
     const pairs = Object.entries(SETS).flatMap(([set, group]) => found[set].map(({ from, to, unit }) => ({ value: `${set}.${from}.${to}`, label: `${from} to ${to}${unit === "1" ? "" : ` [${unit}]`}`, group })));
     return [...loops, ...pairs];
   }
 
-  function chosen() {
-    const all = options();
+  function chosen(answer) {
+    const all = options(answer);
     return all.find(({ value }) => value === param("transfer", null)) ?? all[0];
   }
 
-  function drawChoice() {
-    const held = choice.contains(document.activeElement);
-    const all = options();
-    if (!all.length) return void dom.clear(choice);
-    dom.clear(choice).append(dom.select("Transfer", all, chosen().value, (value) => setParam("transfer", value)));
-    if (held) choice.querySelector("select").focus();
-    return undefined;
+  function choices(answer) {
+    const all = options(answer);
+    return all.length ? [dom.select("Transfer", all, chosen(answer).value, (value) => setParam("transfer", value))] : [];
   }
 
-  function draw() {
-    const { value, label, group } = chosen();
+  function draw(picture, answer) {
+    const { value, label, group } = chosen(answer);
     const [set, from, to] = value.split(".");
     const curveOf = ({ frequency_response: found }) => (set === "loop" ? cutLoop(found, from) : decibels(found, found[set].find((one) => one.from === from && one.to === to)));
     const [mine, first] = [curveOf(answer.now), curveOf(answer.designed)];

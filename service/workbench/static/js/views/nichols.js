@@ -1,11 +1,8 @@
 /** The loop as a Nichols or a Nyquist plot, with its margins and the disk that it stays out of. */
 
-import { liveController } from "./live/live.js";
-import { AT_POINT } from "./live/scope.js";
+import { frequencyView } from "./live/frequency_view.js";
 import { circle, cutLoop, diskCircle, marginMarks, short } from "./loop_curves.js";
-import { figureTable, reasonList, verdictLine } from "./point_figures.js";
 
-const STUDIES = ["point", "frequency_response"];
 const FREQUENCIES = 400;
 const CLOSED_LOOP_DB = [-20, -12, -6, -3, 0, 1, 3, 6, 12];
 const WINDOW_DB = [-36, 36];
@@ -15,62 +12,36 @@ export default { id: "nichols", title: "Nichols and Nyquist", group: "point", ne
 
 function mount(el, context) {
   const { plot, dom, param, setParam } = context;
-  const { h } = dom;
-  const choice = h("div", { class: "row" });
-  el.append(choice);
-  const live = liveController(el, context, { scope: AT_POINT, studies: STUDIES, query: () => ({ frequencies: FREQUENCIES }), onAnswer });
-  const picture = h("div", {});
-  const figures = h("div", { class: "stack" });
-  live.body.append(h("div", { class: "live-wide" }, picture, figures));
-  let answer = null;
-  live.start();
-  return { update, unmount };
+  return frequencyView(el, context, { frequencies: FREQUENCIES, choices, draw });
 
-  function unmount() {
-    live.unmount();
-    plot.forget(picture);
+  function inputs({ designed }) {
+    return Object.keys(designed.point.controllers[0].margins);
   }
 
-  function update(changed) {
-    if (changed.has("controller") || changed.has("point") || changed.has("design")) {
-      answer = null;
-      dom.clear(choice);
-    }
-    live.update(changed);
-    if (answer && changed.has("params")) draw();
+  function cut(answer) {
+    return inputs(answer).includes(param("cut", null)) ? param("cut", null) : inputs(answer)[0];
   }
 
-  function onAnswer(told) {
-    const first = answer === null;
-    answer = told;
-    const [mine, designed] = [told.now.point.controllers[0], told.designed.point.controllers[0]];
-    if (first) drawChoice();
-    dom.clear(figures).append(verdictLine(mine), figureTable(mine, designed), reasonList(mine));
-    if (told.now.frequency_response) return draw();
-    dom.message(picture, "refused", told.problems.frequency_response.detail);
-    return undefined;
+  function nyquist() {
+    return param("form", "nichols") === "nyquist";
   }
 
-  function inputs() {
-    return Object.keys(answer.designed.point.controllers[0].margins);
+  function choices(answer) {
+    const loops = inputs(answer).map((input) => ({ value: input, label: `opened at the ${input}` }));
+    return [
+      dom.select("Loop", loops, cut(answer), (value) => setParam("cut", value)),
+      dom.checkbox("Nyquist plot", nyquist(), (on) => setParam("form", on ? "nyquist" : null)),
+    ];
   }
 
-  function drawChoice() {
-    const loops = inputs().map((input) => ({ value: input, label: `opened at the ${input}` }));
-    const nyquist = dom.checkbox("Nyquist plot", param("form", "nichols") === "nyquist", (on) => setParam("form", on ? "nyquist" : null));
-    dom.clear(choice).append(dom.select("Loop", loops, param("cut", loops[0].value), (value) => setParam("cut", value)), nyquist);
-  }
-
-  function draw() {
-    const input = inputs().includes(param("cut", null)) ? param("cut", null) : inputs()[0];
-    const mine = cutLoop(answer.now.frequency_response, input);
-    const first = cutLoop(answer.designed.frequency_response, input);
+  function draw(picture, answer) {
+    const input = cut(answer);
+    const [mine, first] = [answer.now, answer.designed].map((one) => cutLoop(one.frequency_response, input));
     const margins = answer.now.point.controllers[0].margins[input];
     const marks = marginMarks(mine, margins);
     const said = marks.map(({ words, omega }) => `${words} at ${short(omega)} rad/s`).join(", ") || "no margin is finite";
-    const nyquist = param("form", "nichols") === "nyquist";
-    const { traces, layout } = nyquist ? nyquistPlot(mine, first, marks, margins) : nicholsPlot(mine, first, marks, margins);
-    return plot.draw(picture, traces, layout, { label: `${nyquist ? "Nyquist" : "Nichols"} plot of the loop opened at the ${input}: ${said}`, height: 600 });
+    const { traces, layout } = nyquist() ? nyquistPlot(mine, first, marks, margins) : nicholsPlot(mine, first, marks, margins);
+    return plot.draw(picture, traces, layout, { label: `${nyquist() ? "Nyquist" : "Nichols"} plot of the loop opened at the ${input}: ${said}`, height: 600 });
   }
 }
 
@@ -90,9 +61,9 @@ function markers(marks, read) {
   });
 }
 
-const NOW = () => ({ color: "--series-1", width: 2.2, dash: "solid" });
+const NOW = { color: "--series-1", width: 2.2, dash: "solid" };
 const DESIGNED = { color: "--line-strong", width: 1.3, dash: "dash" };
-const DISK = () => ({ mode: "lines", line: { color: "--series-4", dash: "dot", width: 1.6 }, fill: "toself", fillcolor: "rgba(204, 121, 167, 0.12)", hoverinfo: "skip" });
+const DISK = { mode: "lines", line: { color: "--series-4", dash: "dot", width: 1.6 }, fill: "toself", fillcolor: "rgba(204, 121, 167, 0.12)", hoverinfo: "skip" };
 
 function nicholsPlot(mine, first, marks, margins) {
   const phases = mine.phase.filter((value, k) => value !== null && mine.db[k] > WINDOW_DB[0] && mine.db[k] < WINDOW_DB[1]);
@@ -101,9 +72,9 @@ function nicholsPlot(mine, first, marks, margins) {
   const disk = turns.flatMap((turn) => [...diskCircle(margins.disk_margin).map((value) => place(value, turn)), [null, null]]);
   const traces = [
     ...closedLoopLines(turns),
-    ...(disk.length > turns.length ? [{ name: "disk", x: disk.map(([x]) => x), y: disk.map(([, y]) => y), ...DISK() }] : []),
+    ...(disk.length > turns.length ? [{ name: "disk", x: disk.map(([x]) => x), y: disk.map(([, y]) => y), ...DISK }] : []),
     curve("as designed", first.phase, first.db, DESIGNED, first.omega),
-    curve("loop", mine.phase, mine.db, NOW(), mine.omega),
+    curve("loop", mine.phase, mine.db, NOW, mine.omega),
     { name: "critical", x: turns, y: turns.map(() => 0), mode: "markers", marker: { symbol: "x", size: 10, color: "--bad" } },
     ...markers(marks, ({ phase, db }) => [phase, db]),
   ];
@@ -160,10 +131,10 @@ function nyquistPlot(mine, first, marks, margins) {
   const disk = diskCircle(margins.disk_margin);
   const traces = [
     { name: "unit circle", ...read(circle(0, 1)), mode: "lines", hoverinfo: "skip", line: { color: "--line-strong", width: 1, dash: "dot" } },
-    ...(disk.length ? [{ name: "disk", ...read(disk), ...DISK() }] : []),
+    ...(disk.length ? [{ name: "disk", ...read(disk), ...DISK }] : []),
     curve("as designed", first.re, first.im, DESIGNED, first.omega),
     curve("negative frequencies", mine.re, mirrored, { color: "--series-1", width: 1, dash: "dot" }, mine.omega),
-    curve("loop", mine.re, mine.im, NOW(), mine.omega),
+    curve("loop", mine.re, mine.im, NOW, mine.omega),
     { name: "critical", x: [-1], y: [0], mode: "markers", marker: { symbol: "x", size: 10, color: "--bad" } },
     ...markers(marks, ({ phase, db }) => [10 ** (db / 20) * Math.cos((phase * Math.PI) / 180), 10 ** (db / 20) * Math.sin((phase * Math.PI) / 180)]),
   ];
