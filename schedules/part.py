@@ -22,6 +22,8 @@ from schedules.study import Controller, Study
 #: Points of a part: gains that are searched together cost less a point, but for a few dozen of them hardly less.
 #: Loops of state feedback with delays are judged one by one, each up to a quarter of a second.
 POINTS, DELAYED_POINTS = 25, 8
+#: Points that are designed and judged at once where that is cheap: it takes 130 kB a point while it lasts.
+AT_ONCE = 2500
 
 
 @dataclass(frozen=True, order=True)
@@ -66,6 +68,17 @@ def parts_of(study: Study, request: Controller) -> tuple[Part, ...]:
     if count is None:
         return ()
     return tuple(Part(request.name, first, min(first + count, size)) for first in range(0, size, count))
+
+
+def blocks_of(study: Study, request: Controller) -> tuple[Part, ...]:
+    """The pieces that one of the study's controllers is computed in: its parts, or as much as memory is to hold.
+
+    None where all of the grid is computed at once.
+    """
+    size = len(study.grid.altitude) * len(study.grid.speed)
+    if (pieces := parts_of(study, request)) or size <= AT_ONCE:
+        return pieces
+    return tuple(Part(request.name, first, min(first + AT_ONCE, size)) for first in range(0, size, AT_ONCE))
 
 
 def _points(study: Study, request: Controller) -> int | None:

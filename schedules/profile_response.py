@@ -7,6 +7,7 @@ from typing import get_args
 
 from design.gains import Gain
 from design.response.demand import ActuatorDemand
+from design.simulation.request import check_steps
 from design.simulation.response import SimulationOutcome
 from model.arrays import BoolArray, FloatArray
 from model.flight import FlightCondition
@@ -39,14 +40,7 @@ class ProfileRequest:
     estimate_error: bool = False
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.duration < float("inf"):
-            raise ValueError(f"duration must be positive and finite, not {self.duration} s")
-        if self.samples < 2:
-            raise ValueError(f"a response needs at least two samples, not {self.samples}")
-        if not 0.0 < self.tolerance < 1.0:
-            raise ValueError(f"tolerance must lie between 0 and 1, not {self.tolerance}")
-        if self.substeps is not None and self.substeps < 1:
-            raise ValueError(f"there is at least one step between two samples, not {self.substeps}")
+        check_steps(self.duration, self.samples, self.tolerance, self.substeps)
         if self.trim not in get_args(ControllerTrim):
             raise ValueError(f"trim must be scheduled, exact or held, not {self.trim!r}")
 

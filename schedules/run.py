@@ -27,7 +27,7 @@ from schedules.digests import study_digest
 from schedules.envelope_warnings import envelope_warnings
 from schedules.joined import joined
 from schedules.judging import figures_at, horizon, judged
-from schedules.part import Part, parts, parts_of, plant_at, request_at, requested
+from schedules.part import Part, blocks_of, parts, plant_at, request_at, requested
 from schedules.second_try import TRIES, missed_a_little
 from schedules.smoothing import smooth
 from schedules.state_feedback import state_feedback
@@ -78,8 +78,8 @@ def _kept(study: Study, done: Sequence[Synthesised]) -> dict[Part, PartDesign]:
 def _over_grid(
     study: Study, plant: PlantEnvelope, request: Controller, kept: dict[Part, PartDesign]
 ) -> DesignedController:
-    """A controller of the study over its grid: of its parts, where it has any."""
-    pieces = parts_of(study, request)
+    """A controller of the study over its grid, of its pieces, where it is computed in some."""
+    pieces = blocks_of(study, request)
     if not pieces:
         return design(study, plant, request)
     designs = [kept[part] if part in kept else designed_part(study, plant, part) for part in pieces]

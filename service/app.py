@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from functools import cache
+from functools import cache, partial
 
 from anyio import CapacityLimiter, Semaphore, to_thread
 from fastapi import Depends, FastAPI
@@ -17,6 +17,7 @@ from service.access.guard import Guard
 from service.designs import Designs, design_id
 from service.documentation import openapi, pages
 from service.documentation.design_examples import design_requests
+from service.envelopes import Envelopes
 from service.examples import NAMES
 from service.housekeeping import house_kept
 from service.http.body_limit import BodyLimit
@@ -25,6 +26,7 @@ from service.http.head_requests import HeadRequests
 from service.http.negotiation import acceptable
 from service.jobs.example import example_job
 from service.jobs.jobs import Jobs
+from service.limits import check_made_again
 from service.metrics import Metrics
 from service.routes import ROUTERS
 from service.schemas.requests import DesignRequest
@@ -60,7 +62,8 @@ def create_app(settings: Settings | None = None) -> Application:
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         url = chosen.database_url
         store = Store(chosen.data_dir, None if url is None else url.get_secret_value())
-        designs = Designs(store.designs, chosen.kept_envelopes)
+        ready = Envelopes(chosen.kept_envelopes, chosen.kept_point_designs)
+        designs = Designs(store.designs, ready, partial(check_made_again, settings=chosen))
         slots, door = Semaphore(chosen.max_concurrent_designs), Door(chosen, store.keys)
         metrics.watch_waiting(lambda: slots.statistics().tasks_waiting)
         try:

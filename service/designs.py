@@ -76,9 +76,14 @@ def design_id(request: DesignRequest) -> str:
 class Designs:
     """The designs of one server, all of them, or as one who asks sees them (`of`)."""
 
-    def __init__(self, store: DesignStore, kept: int) -> None:
-        self._store = store
-        self._envelopes = Envelopes(kept)
+    def __init__(
+        self,
+        store: DesignStore,
+        envelopes: Envelopes,
+        check: Callable[[DesignRequest], None] = lambda request: None,
+    ) -> None:
+        """Designs of a store; `check` raises of a request that is not to be designed again in this process."""
+        self._store, self._envelopes, self._check = store, envelopes, check
         self._asking = OPERATOR
         self._check_room: Callable[[], None] = _boundless
 
@@ -161,10 +166,16 @@ class Designs:
         Raises
         ------
         NotFound : there is no such design
+        LimitExceeded : it is not in memory, and larger than what is designed in line
         StaleDesign : made again by this code, its gains differ from those that were answered
         """
         stored = self.find(ident)
-        return self._envelopes.get(ident, lambda: _made_again(stored))
+        return self._envelopes.get(ident, lambda: self._made_again(stored))
+
+    def _made_again(self, stored: StoredDesign) -> DesignedEnvelope:
+        request = DesignRequest.model_validate_json(stored.request)
+        self._check(request)
+        return _made_again(stored, request)
 
     def provenance(self, ident: str) -> Provenance:
         """Where the schedules of this design come from."""
@@ -250,8 +261,7 @@ def stored_design(
     return StoredDesign(ident, request.name, moment, code_version(), canonical(request), answered, kept), envelope
 
 
-def _made_again(stored: StoredDesign) -> DesignedEnvelope:
-    request = DesignRequest.model_validate_json(stored.request)
+def _made_again(stored: StoredDesign, request: DesignRequest) -> DesignedEnvelope:
     envelope = _from_parts(request, stored) or designed(request)
     answered = orjson.loads(stored.answer)["controllers"]
     for controller, before in zip(envelope.controllers, answered, strict=True):

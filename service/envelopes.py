@@ -10,10 +10,16 @@ from schedules.designed import DesignedEnvelope
 
 
 class Envelopes:
-    """At most `kept` envelopes by design id; the one used longest ago goes first."""
+    """Envelopes by design id, so many and so large as may be; the one used longest ago goes first, the last one stays.
 
-    def __init__(self, kept: int) -> None:
-        self._kept = kept
+    Parameters
+    ----------
+    kept : how many at most
+    point_designs : grid points times controllers of all of them at most; None: as many as there are
+    """
+
+    def __init__(self, kept: int, point_designs: int | None = None) -> None:
+        self._kept, self._point_designs = kept, point_designs
         self._ready: OrderedDict[str, DesignedEnvelope] = OrderedDict()
         self._making: dict[str, Lock] = {}
         self._lock = Lock()
@@ -48,5 +54,13 @@ class Envelopes:
     def _keep(self, ident: str, envelope: DesignedEnvelope) -> None:
         with self._lock:
             self._ready[ident] = envelope
-            while len(self._ready) > self._kept:
+            while len(self._ready) > 1 and self._too_many():
                 self._ready.popitem(last=False)
+
+    def _too_many(self) -> bool:
+        if len(self._ready) > self._kept or self._point_designs is None:
+            return len(self._ready) > self._kept
+        return (
+            sum(one.plant.outcomes.codes.size * len(one.controllers) for one in self._ready.values())
+            > self._point_designs
+        )

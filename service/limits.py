@@ -242,6 +242,17 @@ def check_design(request: DesignRequest, settings: Settings) -> None:
     check_size("/grid", what, searches, "max_tab_only_designs", settings)
 
 
+def check_made_again(request: DesignRequest, settings: Settings) -> None:
+    """Refuse to make a stored design again that is larger than what is designed here, its searches not counted.
+
+    Raises
+    ------
+    LimitExceeded
+    """
+    work = check_grid(request.grid, settings) * len(request.controllers)
+    check_size("/grid", "grid points times controllers", work, "max_point_designs", settings)
+
+
 #: Stretches that a period of a sine counts for.
 _STRETCHES = 8
 

@@ -137,3 +137,9 @@ class Settings(BaseSettings):
         default=10_000, ge=1, description="Answers of an owner kept for their Idempotency-Key, for 24 h each"
     )
     kept_envelopes: int = Field(default=16, ge=1, description="Designs kept ready in memory")
+    kept_point_designs: int = Field(
+        default=30_000,
+        ge=1,
+        description="Grid points times controllers of the designs kept ready in memory, some 14 kB each; the design "
+        "used last is kept whatever its size",
+    )

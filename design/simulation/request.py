@@ -10,6 +10,23 @@ from model.actuators import ActuatorLimits
 SURFACES = ("tab", "aileron")
 
 
+def check_steps(duration: float, samples: int, tolerance: float, substeps: int | None) -> None:
+    """Refuse a duration [s], samples, a tolerance or steps between two samples that no simulation has.
+
+    Raises
+    ------
+    ValueError : a number out of its range
+    """
+    if not 0.0 < duration < float("inf"):
+        raise ValueError(f"duration must be positive and finite, not {duration} s")
+    if samples < 2:
+        raise ValueError(f"a response needs at least two samples, not {samples}")
+    if not 0.0 < tolerance < 1.0:
+        raise ValueError(f"tolerance must lie between 0 and 1, not {tolerance}")
+    if substeps is not None and substeps < 1:
+        raise ValueError(f"there is at least one step between two samples, not {substeps}")
+
+
 @dataclass(frozen=True)
 class Friction:
     """Coulomb friction of a hinge with its drive (seed 7.4.4).
@@ -90,14 +107,7 @@ class SimulationRequest:
     estimate_error: bool = False
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.duration < float("inf"):
-            raise ValueError(f"duration must be positive and finite, not {self.duration} s")
-        if self.samples < 2:
-            raise ValueError(f"a response needs at least two samples, not {self.samples}")
-        if not 0.0 < self.tolerance < 1.0:
-            raise ValueError(f"tolerance must lie between 0 and 1, not {self.tolerance}")
-        if self.substeps is not None and self.substeps < 1:
-            raise ValueError(f"there is at least one step between two samples, not {self.substeps}")
+        check_steps(self.duration, self.samples, self.tolerance, self.substeps)
         if self.anti_windup is not None and not 0.0 <= self.anti_windup < float("inf"):
             raise ValueError(f"anti_windup must be at least 0 and finite, not {self.anti_windup} 1/s")
         unknown = [name for name in (*self.limits, *self.friction) if name not in SURFACES]

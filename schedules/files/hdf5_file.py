@@ -16,8 +16,8 @@ import numpy as np
 
 from design.gains import Gain
 from design.outcome import Outcome, Outcomes
-from model.arrays import FloatArray
 from model.flight import GridAxis
+from schedules.files.array_members import member, numbers
 from schedules.files.header import header, object_array, require_format, schedule_from, units
 from schedules.files.proof_words import proof_members
 from schedules.schedule import GainSchedule
@@ -80,11 +80,11 @@ def read_hdf5(content: bytes) -> GainSchedule:
         raise ValueError(f"not a schedule file in HDF5: {error}") from None
     require_format(words)
     axes = tuple(
-        GridAxis(inner_name(name, _unit(unit, name)), _unit(unit, name), tuple(_numbers(arrays, name).ravel().tolist()))
+        GridAxis(inner_name(name, _unit(unit, name)), _unit(unit, name), tuple(numbers(arrays, name).ravel().tolist()))
         for name in _names(words, "axes")
     )
     shape = tuple(len(axis.values) for axis in axes)
-    gains = tuple(Gain(name, _unit(unit, name), _numbers(arrays, name)) for name in _names(words, "gains"))
+    gains = tuple(Gain(name, _unit(unit, name), numbers(arrays, name)) for name in _names(words, "gains"))
     codes = [Outcome(_decoded(code)) for code in _over_grid(arrays, "outcome", shape)]
     reasons = [_unescaped(_decoded(why)) or None for why in _over_grid(arrays, "reason", shape)]
     return schedule_from(words, axes, gains, Outcomes(object_array(codes, shape), object_array(reasons, shape)))
@@ -157,21 +157,8 @@ def _unit(units: dict[str, str], name: str) -> str:
     return units[name]
 
 
-def _member(arrays: dict[str, Any], name: str) -> Any:
-    if name not in arrays:
-        raise ValueError(f"not a schedule file: it has no {name}")
-    return arrays[name]
-
-
-def _numbers(arrays: dict[str, Any], name: str) -> FloatArray:
-    array = _member(arrays, name)
-    if array.dtype != np.float64:
-        raise ValueError(f"{name} must hold numbers in double precision")
-    return np.asarray(array, dtype=float)
-
-
 def _over_grid(arrays: dict[str, Any], name: str, shape: tuple[int, ...]) -> list[Any]:
-    array = _member(arrays, name)
+    array = member(arrays, name)
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}, the grid has {shape}")
     flat: list[Any] = array.ravel().tolist()

@@ -16,8 +16,8 @@ import numpy as np
 
 from design.gains import Gain
 from design.outcome import Outcome, Outcomes
-from model.arrays import FloatArray
 from model.flight import GridAxis
+from schedules.files.array_members import member, numbers
 from schedules.files.header import header, object_array, require_format, schedule_from, units
 from schedules.files.proof_words import proof_members
 from schedules.schedule import GainSchedule
@@ -68,7 +68,7 @@ def read_npz(content: bytes) -> GainSchedule:
     except _NOT_READ as error:
         raise ValueError(f"not a numpy archive: {error}") from None
     try:
-        about = json.loads(str(_member(arrays, "gainfield")))
+        about = json.loads(str(member(arrays, "gainfield")))
     except RecursionError:
         raise ValueError("not a schedule file: nested too deeply") from None
     if not isinstance(about, dict):
@@ -76,10 +76,10 @@ def read_npz(content: bytes) -> GainSchedule:
     require_format(about)
     unit: Any = about.get("units")
     axes = tuple(
-        GridAxis(inner_name(name, unit[name]), unit[name], tuple(_numbers(arrays, name).ravel().tolist()))
+        GridAxis(inner_name(name, unit[name]), unit[name], tuple(numbers(arrays, name).ravel().tolist()))
         for name in _names(about, "axes", unit)
     )
-    gains = tuple(Gain(name, unit[name], _numbers(arrays, name)) for name in _names(about, "gains", unit))
+    gains = tuple(Gain(name, unit[name], numbers(arrays, name)) for name in _names(about, "gains", unit))
     return schedule_from(about, axes, gains, _outcomes(arrays, about.get("reasons")))
 
 
@@ -106,21 +106,8 @@ def _names(about: dict[str, Any], which: str, unit: Any) -> list[str]:
     return listed
 
 
-def _member(arrays: dict[str, Any], name: str) -> Any:
-    if name not in arrays:
-        raise ValueError(f"not a schedule file: it has no {name}")
-    return arrays[name]
-
-
-def _numbers(arrays: dict[str, Any], name: str) -> FloatArray:
-    array = _member(arrays, name)
-    if array.dtype != np.float64:
-        raise ValueError(f"{name} must hold numbers in double precision")
-    return np.asarray(array, dtype=float)
-
-
 def _outcomes(arrays: dict[str, Any], reasons: Any) -> Outcomes:
-    codes = _member(arrays, "outcome")
+    codes = member(arrays, "outcome")
     if not isinstance(reasons, list) or len(reasons) != codes.size:
         raise ValueError(f"reasons must be a list of {codes.size}, row-major")
     if any(reason is not None and not isinstance(reason, str) for reason in reasons):

@@ -17,6 +17,7 @@ from service.access.door import Admitted, Door
 from service.access.principals import OPERATOR, Principal
 from service.app import Application, create_app
 from service.designs import Designs
+from service.envelopes import Envelopes
 from service.jobs.given_designs import GivenDesigns
 from service.settings import Settings
 from service.state import State
@@ -36,7 +37,7 @@ def replayed(
     """
     written = json.dumps(limits, sort_keys=True)
     app, store = _app(written, get_ident()), _GivenStore(designs)
-    kept = Designs(store.designs, len(designs) + 1)
+    kept = Designs(store.designs, Envelopes(len(designs) + 1))
     settings = _settings(written)
     shared = State(settings, store, kept, Semaphore(1), CapacityLimiter(1), _OpenDoor(), app.metrics, None)
     app.state.shared = shared

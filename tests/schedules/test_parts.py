@@ -134,6 +134,54 @@ def test_cutting_changes_no_more_than_last_bits(wind_tunnel_study, kind, blocks_
             np.testing.assert_array_equal(cut.infeasibility != None, whole.infeasibility != None)  # noqa: E711
 
 
+def _cheap(study):
+    """Controllers that have no parts: gains that are given and vary, regulators as they run and of estimates."""
+    lqr = study.controllers[2]
+    gains = {"K_f": np.linspace(0.2, 0.4, 8).reshape(2, 4), "K_i": 2.0}
+    return replace(
+        study,
+        controllers=(
+            ClassicalController("given", "positive_feedback", gains=gains),
+            lqr,
+            replace(lqr, name="code", sampling=Sampling(0.004, 0.0)),
+            replace(lqr, name="estimates", measurement=KALMAN),
+        ),
+    )
+
+
+def test_a_large_grid_is_computed_block_by_block(wind_tunnel_study, monkeypatch):
+    study = _cheap(wind_tunnel_study)
+    assert parts(study) == ()
+    whole = run(study)
+    assert all(np.any(one.outcomes.ok) for one in whole.controllers)
+    monkeypatch.setattr(room, "AT_ONCE", 3)
+    assert parts(study) == ()
+    for cut, wanted in zip(run(study).controllers, whole.controllers, strict=True):
+        assert cut.outcomes.codes.tolist() == wanted.outcomes.codes.tolist()
+        for one, other in zip(cut.gains, wanted.gains, strict=True):
+            np.testing.assert_allclose(one.values, other.values, rtol=1e-12)
+        assert [one.spec for one in cut.verdicts] == [one.spec for one in wanted.verdicts]
+        for one, other in zip(cut.verdicts, wanted.verdicts, strict=True):
+            np.testing.assert_allclose(one.values, other.values, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(cut.assessment.poles, wanted.assessment.poles, rtol=1e-9)
+
+
+def test_no_more_points_are_judged_at_once_than_memory_holds(wind_tunnel_study, monkeypatch):
+    import schedules.run as run_room
+
+    seen = []
+    judged = run_room.judged
+
+    def counted(study, plant, *rest):
+        seen.append(plant.outcomes.codes.size)
+        return judged(study, plant, *rest)
+
+    monkeypatch.setattr(run_room, "judged", counted)
+    grid = GridRequest(tuple(np.linspace(0.0, 3000.0, 51)), "dynamic_pressure", tuple(np.linspace(245.0, 1500.0, 50)))
+    run(replace(wind_tunnel_study, grid=grid, controllers=wind_tunnel_study.controllers[2:]))
+    assert seen == [2500, 50]
+
+
 def test_limits_and_gains_that_vary_over_the_grid_go_to_their_points(wind_tunnel_study, blocks_of_three):
     limit = np.linspace(0.35, 0.6, 8).reshape(2, 4)
     given = np.linspace(0.2, 0.5, 4)[None]  # the same at both altitudes

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from service.envelopes import Envelopes
@@ -23,6 +25,22 @@ def test_keeps_the_last_used() -> None:
     assert made == ["a", "b", "c", "b"]
     assert "a" in envelopes
     assert "c" not in envelopes
+
+
+def test_keeps_no_more_points_than_may_be_but_the_last_design_whatever_its_size() -> None:
+    def of(points: int) -> Any:
+        plant = SimpleNamespace(outcomes=SimpleNamespace(codes=np.zeros((1, points))))
+        return SimpleNamespace(plant=plant, controllers=("nf", "lqr"))
+
+    envelopes = Envelopes(10, 20)
+    for ident, points in (("a", 3), ("b", 4), ("c", 3), ("d", 1)):
+        envelopes.get(ident, lambda points=points: of(points))
+    assert [ident in envelopes for ident in "abcd"] == [False, True, True, True]
+    envelopes.get("large", lambda: of(50))
+    assert [ident in envelopes for ident in ("b", "c", "d", "large")] == [False, False, False, True]
+    envelopes.get("small", lambda: of(1))
+    assert "large" not in envelopes
+    assert "small" in envelopes
 
 
 def test_made_once_for_many() -> None:

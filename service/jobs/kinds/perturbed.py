@@ -10,6 +10,7 @@ import orjson
 
 from schedules.perturbed_cases import FlownCases
 from service.designs import Designs
+from service.envelopes import Envelopes
 from service.jobs.frames import cut, joined
 from service.jobs.given_designs import GivenDesigns, design_document, read_design
 from service.jobs.kinds.kind import Document, Finished
@@ -66,6 +67,6 @@ class PerturbedJobs:
 
 def _asked(task: Document) -> Perturbed:
     design = read_design(task["design"])
-    envelope = Designs(GivenDesigns({design.id: design}), 1).envelope(design.id)
+    envelope = Designs(GivenDesigns({design.id: design}), Envelopes(1)).envelope(design.id)
     settings = Settings(max_flown_loops=_BOUNDLESS, max_delayed_loops=_BOUNDLESS)
     return perturbed(envelope, task["controller"], WantedPerformance(**task["wanted"]), settings)

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from service.designs import Designs
+from service.envelopes import Envelopes
 from service.schemas.requests import DesignRequest
 from service.store.store import Store
 
@@ -25,7 +26,7 @@ def stored(tmp_path: Path, quick: dict[str, Any]) -> Path:
     """A data directory that holds one design."""
     store = Store(tmp_path / "data")
     try:
-        Designs(store.designs, 1).create(DesignRequest.model_validate(quick))
+        Designs(store.designs, Envelopes(1)).create(DesignRequest.model_validate(quick))
     finally:
         store.close()
     return tmp_path / "data"

@@ -136,6 +136,32 @@ def test_more_than_is_done_in_line_becomes_a_job_within_its_limit(here: TestClie
     assert (limits["job_work_factor"], limits["max_queued_jobs"]) == (10, 100)
 
 
+def test_what_is_asked_of_a_design_too_large_to_be_made_in_line_is_a_job(tmp_path: Path, large: Any) -> None:
+    """Made by a job, it is not made again in the server for what is asked of it; smaller ones are."""
+    wanted = large(6, "lqr")
+    settings = Settings(data_dir=tmp_path / "small", max_point_designs=5, job_work_factor=2)
+    with TestClient(create_app(settings)) as client:
+        answer = client.post("/v1/designs", json=wanted)
+        assert answer.status_code == 202
+        design = str(finished(client, answer.json()["id"])["result"])
+        assert client.get(design).status_code == 200
+        answers = {}
+        for path in ("controllers/lqr/figures", "points/2", "schedules/lqr.json", "report"):
+            answer = client.get(f"{design}/{path}")
+            assert answer.status_code == 202, path
+            job = finished(client, answer.json()["id"])
+            assert job["state"] == "succeeded", job
+            answers[path] = client.get(job["links"]["result"])
+        ident = client.post("/v1/designs", json=large(5, "lqr")).json()["id"]
+        assert client.get(f"/v1/designs/{ident}/controllers/lqr/figures").status_code == 200
+    with TestClient(create_app(Settings(data_dir=tmp_path / "wide"))) as client:
+        ident = client.post("/v1/designs", json=wanted).json()["id"]
+        figures = client.get(f"/v1/designs/{ident}/controllers/lqr/figures")
+    assert design.endswith(ident)
+    assert answers["controllers/lqr/figures"].content == figures.content
+    assert answers["report"].headers["content-type"].startswith("text/html")
+
+
 def test_heavy_answers_above_their_limit_become_jobs(tmp_path: Path, large: Any, refused: Any) -> None:
     settings = Settings(data_dir=tmp_path, max_flown_loops=4, job_work_factor=3)
     with TestClient(create_app(settings), raise_server_exceptions=False) as client:
