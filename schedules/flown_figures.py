@@ -22,8 +22,8 @@ MARGIN_QUANTITIES = ("gain_margin", "phase_margin", "delay_margin", "disk_margin
 #: Loops that are put together at once.
 AT_ONCE = 4096
 _FIGURES = 2 + len(STEP_QUANTITIES) + len(MARGIN_QUANTITIES)
-#: Loops of one request: some twenty seconds with steps, and with delays twice that.
-MOST_LOOPS, MOST_DELAYED_LOOPS = 1 << 18, 1 << 14
+#: Loops of one study: two or three minutes of work with steps, with delays five; some hundred bytes each.
+MOST_LOOPS, MOST_DELAYED_LOOPS = 1 << 21, 1 << 17
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,9 @@ import pytest
 from fastapi.testclient import TestClient
 from pydantic import TypeAdapter
 
+from schedules.flown_figures import MOST_DELAYED_LOOPS, MOST_LOOPS
 from service.app import create_app
+from service.limits import of_jobs
 from service.schemas.jobs import Job, JobList
 from service.settings import Settings
 
@@ -160,6 +162,12 @@ def test_what_is_asked_of_a_design_too_large_to_be_made_in_line_is_a_job(tmp_pat
     assert design.endswith(ident)
     assert answers["controllers/lqr/figures"].content == figures.content
     assert answers["report"].headers["content-type"].startswith("text/html")
+
+
+def test_the_domain_flies_what_a_job_may_fly() -> None:
+    widest = of_jobs(Settings())
+    assert widest.max_flown_loops <= MOST_LOOPS
+    assert widest.max_delayed_loops <= MOST_DELAYED_LOOPS
 
 
 def test_heavy_answers_above_their_limit_become_jobs(tmp_path: Path, large: Any, refused: Any) -> None:
