@@ -280,7 +280,7 @@ def test_weights_of_any_rule_move_the_grid(
     request["controllers"][0]["weights"][path][1][1] = value
     gains = made(address, request)["controllers"][0]["gains"]
     expected = next(gain["values"] for gain in gains if gain["name"] == "K_T_a_da")
-    assert trace(tab, "now, ")["y"] == expected[0]
+    assert trace(tab, "altitude")["y"] == expected[0]
 
 
 def test_a_view_of_weights_is_opened_with_a_controller_that_has_some(

@@ -5,6 +5,7 @@ import { liveController } from "./live/live.js";
 import { WEIGHTS_OVER_GRID } from "./live/scope.js";
 
 const STUDIES = ["actuator_requirements"];
+const LEGEND_ROWS = 8; // more lines than these would leave no room for the plot; a pointer on one says which it is
 const PEAKS = ["peak_torque_n_m", "holding_torque_n_m", "peak_rate_deg_s", "peak_deflection_deg", "peak_power_w"];
 
 export default { id: "weights", title: "Weights over the grid", group: "envelope", needs: ["controller"], kind: "lqr", mount };
@@ -59,12 +60,12 @@ function mount(el, context) {
     const { grid } = answer.designed.design;
     const [mine, designed] = controllers();
     const [now, was] = [mine, designed].map(({ gains }) => gains.find(({ name }) => name === gain()));
-    const dotted = linesOf(grid, was.values, "design, ").map((line) => ({ ...line, mode: "lines", line: { dash: "dot", color: "--line-strong", width: 1.4 } }));
+    const dotted = linesOf(grid, was.values, "as designed, ").map((line, row) => ({ ...line, mode: "lines", showlegend: row === 0, line: { dash: "dot", color: "--line-strong", width: 1.4 } }));
     const heading = `${gain()} [${was.unit}]`;
-    const layout = { xaxis: valueAxis(grid.axes[1]), yaxis: { title: { text: heading } }, uirevision: gain(), margin: { l: 72, r: 16, t: 24, b: 48 } };
+    const layout = { xaxis: valueAxis(grid.axes[1]), yaxis: { title: { text: heading } }, uirevision: gain(), margin: { l: 72, r: 16, t: 24, b: 48 }, showlegend: dotted.length <= LEGEND_ROWS };
     const failed = mine.outcomes.flat().filter((outcome) => outcome !== "ok").length;
     const label = `${heading} of ${mine.name} over the grid with these weights, beside the design's${failed ? `; ${failed} points have no gains` : ""}`;
-    return plot.draw(picture, [...linesOf(grid, now.values, "now, "), ...dotted], layout, { label, height: 380 });
+    return plot.draw(picture, [...linesOf(grid, now.values), ...dotted], layout, { label, height: 380 });
   }
 
   function tell() {
