@@ -8,7 +8,7 @@ import { figureTable, reasonList, verdictLine } from "./point_figures.js";
 
 const STUDIES = ["point", "root_locus", "response"];
 const SAMPLES = 301;
-const GAINS = 150; // on a locus that is drawn anew with every move; poles between them are found along the branches
+const GAINS = 301; // on a locus that is drawn anew with every move; poles between them are found along the branches
 
 export default { id: "root-locus", title: "Root locus", group: "point", needs: ["controller", "point"], mount };
 
