@@ -89,9 +89,13 @@ async def _answered(app: Application, request: Mapping[str, Any]) -> tuple[int, 
         "query_string": request["query"].encode("latin-1"),
         "headers": [] if body is None else [(b"content-type", b"application/json")],
     }
-    status, headers, pieces = 500, {}, [b""]
+    status, headers, pieces, read = 500, {}, [b""], False
 
     async def receive() -> Message:
+        nonlocal read
+        if read:
+            await anyio.sleep_forever()  # nobody goes away; answers that are sent in pieces watch for that
+        read = True
         return {"type": "http.request", "body": (body or "").encode(), "more_body": False}
 
     async def send(message: Message) -> None:

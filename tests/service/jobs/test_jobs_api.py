@@ -148,7 +148,7 @@ def test_what_is_asked_of_a_design_too_large_to_be_made_in_line_is_a_job(tmp_pat
         design = str(finished(client, answer.json()["id"])["result"])
         assert client.get(design).status_code == 200
         answers = {}
-        for path in ("controllers/lqr/figures", "points/2", "schedules/lqr.json", "report"):
+        for path in ("controllers/lqr/figures", "points", "points/2", "schedules/lqr.json", "report"):
             answer = client.get(f"{design}/{path}")
             assert answer.status_code == 202, path
             job = finished(client, answer.json()["id"])
@@ -162,6 +162,7 @@ def test_what_is_asked_of_a_design_too_large_to_be_made_in_line_is_a_job(tmp_pat
     assert design.endswith(ident)
     assert answers["controllers/lqr/figures"].content == figures.content
     assert answers["report"].headers["content-type"].startswith("text/html")
+    assert len(answers["points"].content.splitlines()) == 6
 
 
 def test_the_domain_flies_what_a_job_may_fly() -> None:
